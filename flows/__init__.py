@@ -1,0 +1,1 @@
+"""Wiring: which task follows which, and the `ses` command."""

@@ -1,0 +1,1 @@
+"""The ideas: geometry, scenarios, synthesis, simulation, learning. Pure: no disk, no Prefect."""

@@ -1,0 +1,47 @@
+"""`compiled`: numba's nopython mode with the project's options and a cache that cannot go stale.
+
+numba keys a cached function by its own file only, so a change in a function that it *calls*
+in another file would be missed. The cache folder therefore carries a digest of every
+compiled module: one changed, all compiled again.
+"""
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar, cast
+
+import numba
+from numba import config
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+_PACKAGE = Path(__file__).parent
+
+
+def _digest_of_compiled_modules() -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(_PACKAGE.rglob("*.py")):
+        text = source.read_bytes()
+        if b"ses_core.compilation" in text:
+            digest.update(text)
+    return digest.hexdigest()[:16]
+
+
+if not getattr(config, "CACHE_DIR", ""):
+    setattr(  # noqa: B010  (numba builds this module at run time: mypy knows no names in it)
+        config,
+        "CACHE_DIR",
+        str(_PACKAGE / "__pycache__" / f"compiled-{_digest_of_compiled_modules()}"),
+    )
+
+
+def compiled(function: Function) -> Function:
+    """Compile a kernel that releases the interpreter lock and keeps IEEE arithmetic."""
+    return cast("Function", numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+
+
+def compiled_parallel(function: Function) -> Function:
+    """Compile a kernel whose `numba.prange` loops run on all threads."""
+    return cast(
+        "Function", numba.njit(cache=True, nogil=True, parallel=True, error_model="numpy")(function)
+    )

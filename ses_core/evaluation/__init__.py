@@ -1,0 +1,1 @@
+"""Paired trials and what they prove."""

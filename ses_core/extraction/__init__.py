@@ -1,0 +1,1 @@
+"""From recordings to scenarios to environments (section III-B)."""

@@ -1,0 +1,1 @@
+"""Learning to set planner parameters (APPLR)."""

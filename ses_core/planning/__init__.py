@@ -1,0 +1,1 @@
+"""The navigation stack: costmap, global plan and trajectory planner of `move_base`."""

@@ -1,0 +1,168 @@
+"""The seams: six protocols, each with at least two implementations and one contract test."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from ses_core.arrays import BoolArray, Float32Array, FloatArray, IntArray
+from ses_core.extraction.recording import Recording
+from ses_core.navigation import NavigationDomain, NavigationTask
+from ses_core.recipes import ArtifactRef, Recipe
+from ses_core.robot_profile import RobotProfile
+
+
+class LogReader(Protocol):
+    """Decodes one format of robot log; run only inside the limited decoder process."""
+
+    def read(self, log: Path, *, profile: RobotProfile, pose_source: str) -> Recording:
+        """Decode a log.
+
+        Raises:
+            LogError: The log cannot be used; its reason is from the closed list.
+        """
+        ...
+
+
+class FittedSynthesizer(Protocol):
+    """Draws environments like those it was fitted to."""
+
+    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+        """Draw cells (count, 30, 30); whether they can be crossed is checked by the caller."""
+        ...
+
+    def arrays(self) -> Mapping[str, NDArray[np.generic]]:
+        """Give what rebuilds it without pickle."""
+        ...
+
+
+class Synthesizer(Protocol):
+    """Learns what challenging environments look like (section III-C)."""
+
+    def fit(
+        self,
+        domain: NavigationDomain,
+        *,
+        rng: Generator,
+        progress: Callable[[float], None],
+    ) -> FittedSynthesizer:
+        """Fit to a domain, hardest environment first; `progress` hears shares from 0 to 1."""
+        ...
+
+
+class Simulator(Protocol):
+    """N robots, each in its own world, each under the whole navigation stack.
+
+    A slot n holds one episode. `advance` moves every unfinished slot by whole control ticks:
+    sense, plan, command, move. A finished slot stays as it ended until it is reset.
+    """
+
+    @property
+    def slots(self) -> int:
+        """N, the number of robots stepped together."""
+        ...
+
+    @property
+    def time_step(self) -> float:
+        """Duration of one control tick [s]."""
+        ...
+
+    def reset(self, slots: IntArray, tasks: Sequence[NavigationTask], seeds: IntArray) -> None:
+        """Start an episode in each of the slots (S,) from tasks and noise seeds (S,)."""
+        ...
+
+    def advance(self, parameters: FloatArray, ticks: int) -> None:
+        """Run control ticks under planner parameters (N, 7)."""
+        ...
+
+    def scans(self) -> Float32Array:
+        """Give the newest scan (N, B) [m] of every slot."""
+        ...
+
+    def state(self) -> "SimulatorState":
+        """Give a copy of every slot's state."""
+        ...
+
+    def close(self) -> None:
+        """Release what is held open."""
+        ...
+
+
+class SimulatorState(Protocol):
+    """What is known of N episodes; arrays have a leading axis N."""
+
+    @property
+    def poses(self) -> FloatArray:
+        """True poses (N, 3) [m, m, rad]."""
+        ...
+
+    @property
+    def velocities(self) -> FloatArray:
+        """Measured velocities (N, 2) [m/s, rad/s]."""
+        ...
+
+    @property
+    def commands(self) -> FloatArray:
+        """Last commands (N, 2) [m/s, rad/s]."""
+        ...
+
+    @property
+    def goals(self) -> FloatArray:
+        """Goals (N, 2) [m]."""
+        ...
+
+    @property
+    def local_goals(self) -> FloatArray:
+        """Point (N, 2) [m] 1 m ahead on the global plan, in the robot's frame."""
+        ...
+
+    @property
+    def times(self) -> FloatArray:
+        """Time since the start (N,) [s]."""
+        ...
+
+    @property
+    def path_lengths(self) -> FloatArray:
+        """Way driven (N,) [m]."""
+        ...
+
+    @property
+    def negative_counts(self) -> IntArray:
+        """Control ticks with a commanded v < 0 (N,)."""
+        ...
+
+    @property
+    def outcomes(self) -> IntArray:
+        """`EpisodeOutcome` values (N,); RUNNING while unfinished."""
+        ...
+
+
+class Policy(Protocol):
+    """Sets planner parameters from observations."""
+
+    def act(self, observations: FloatArray) -> FloatArray:
+        """Map observations (N, D) to planner parameters (N, 7), deterministically."""
+        ...
+
+
+class ArtifactStore(Protocol):
+    """Keeps artifacts by what was asked for, and never builds one twice."""
+
+    def find(self, recipe: Recipe) -> ArtifactRef | None:
+        """Give the artifact that answers a recipe, or None."""
+        ...
+
+    def put(self, recipe: Recipe, build: Callable[[Path], None]) -> ArtifactRef:
+        """Build into an empty folder, then commit it as the answer to a recipe."""
+        ...
+
+    def path(self, ref: ArtifactRef) -> Path:
+        """Give the folder of an artifact, checked against its digest.
+
+        Raises:
+            ArtifactError: It is missing or damaged.
+        """
+        ...

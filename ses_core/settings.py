@@ -1,0 +1,214 @@
+"""Every setting of a night, one frozen model per stage; defaults are the paper's numbers."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ses_core.robot_profile import JACKAL, RobotProfile
+from ses_core.settings_model import SettingsModel
+
+
+class RobotRule(SettingsModel):
+    """Which robots a profile is for."""
+
+    match: str = Field(
+        description="Shell pattern on '<site>/<robot>/<log name>', e.g. '*/neato*/*'."
+    )
+    profile: str = Field(description="Name of the profile these robots have.")
+
+
+class DecoderLimits(SettingsModel):
+    """What the child process that decodes one log may use; a log that needs more is refused."""
+
+    memory_mib: int = Field(2048, ge=1024, description="Address space.")
+    wall_s: float = Field(600.0, gt=0, description="Wall clock.")
+    cpu_s: int = Field(600, ge=1, description="Processor time.")
+    log_mib: int = Field(8192, ge=1, description="Size of the log on disk.")
+    output_mib: int = Field(4096, ge=1, description="Size of what is decoded from it.")
+    message_mib: int = Field(64, ge=1, description="Size of one message.")
+
+
+class IngestSettings(SettingsModel):
+    """How logs are recognised, decoded and put on the 20 Hz clock."""
+
+    identity_pattern: str | None = Field(
+        None,
+        description="Regular expression on the path below the inbox with groups 'site' and "
+        "'robot'; without it the folders '<site>/<robot>/' say so.",
+    )
+    robots: tuple[RobotRule, ...] = Field((), description="First rule that matches decides.")
+    profiles: dict[str, RobotProfile] = Field(
+        default_factory=dict, description="Profiles beside the built-in ones."
+    )
+    default_profile: str = Field("generic", description="Profile of robots that no rule names.")
+    pose_source: Literal["odometry", "map"] = Field(
+        "odometry", description="Pose in the odometry frame, or map -> base where the log has it."
+    )
+    velocity_source: Literal["auto", "commanded", "measured", "derived"] = Field(
+        "auto",
+        description="Which velocity counts; 'auto': commanded, else measured, else from poses.",
+    )
+    step_rate_hz: float = Field(20.0, gt=0, description="Clock of a trajectory (move_base's rate).")
+    gap_s: float = Field(
+        2.0, gt=0, description="Longer without a pose cuts the trajectory (dropout)."
+    )
+    steady_s: float = Field(
+        60.0, ge=0, description="A file younger than this may still be arriving: it is waited for."
+    )
+    limits: DecoderLimits = DecoderLimits()
+
+
+class ExtractionSettings(SettingsModel):
+    """Trajectories to scenarios to 30 x 30 environments (section III-B, Algorithm 2)."""
+
+    distance_m: float = Field(
+        5.0, gt=0, description="Straight-line distance that, once exceeded, closes a scenario."
+    )
+    not_forward_speed_mps: float = Field(
+        0.05, ge=0, description="At or below this speed a step counts as not moving forward."
+    )
+    source: Literal["auto", "scan", "map"] = Field(
+        "auto", description="Rebuild places from scans, a map, or a map where there is one."
+    )
+    unknown: Literal["free", "occupied"] = Field(
+        "free", description="What a cell that no beam reached counts as."
+    )
+    hit_share: float = Field(
+        0.25, gt=0, lt=1, description="Occupied from this share of hits among its beams."
+    )
+    scan_margin_s: float = Field(
+        1.0, ge=0, description="Scans this long before and after a scenario are used and kept."
+    )
+
+
+class FilterSettings(SettingsModel):
+    """Which scenarios are challenging, and how many days of them make the pool."""
+
+    count_kind: Literal["negative", "not-forward", "reversing-seconds"] = Field(
+        "negative",
+        description="Steps with v < 0 (the paper's text), steps with v <= 0.05 m/s (what its "
+        "authors' code counts), or seconds of reversing.",
+    )
+    threshold: float = Field(50.0, ge=0, description="Challenging is a count strictly above this.")
+    challenging_share: float | None = Field(
+        None, gt=0, le=1, description="Instead of the threshold: this share, hardest first."
+    )
+    window_days: int = Field(
+        30, ge=1, description="Days of logs in the pool, up to the last batch."
+    )
+    per_robot_limit: int = Field(
+        1000, ge=1, description="Most environments one robot may put into the pool."
+    )
+    heldout_share: float = Field(
+        0.25, ge=0, lt=1, description="Share of the sites held out for evaluation, by their hash."
+    )
+
+
+class GanSettings(SettingsModel):
+    """SES-GAN: the paper's layers; what it leaves open is a setting here."""
+
+    method: Literal["gan"] = "gan"
+    latent_size: int = Field(64, ge=1, description="Length of the noise vector.")
+    epochs: int = Field(200, ge=1, description="Passes over the challenging environments.")
+    batch_size: int = Field(64, ge=2, description="Environments per update.")
+    learning_rate: float = Field(2e-4, gt=0, description="Of both Adam optimisers.")
+
+
+class PcaSettings(SettingsModel):
+    """SES-PCA: principal components, then K-means in their space."""
+
+    method: Literal["pca"] = "pca"
+    components: int = Field(100, ge=1, description="Principal components (section IV-B).")
+    per_cluster: int = Field(5, ge=1, description="n: environments drawn from each cluster.")
+
+
+class RandomSamplingSettings(SettingsModel):
+    """SES-RS: draw from the challenging environments uniformly."""
+
+    method: Literal["rs"] = "rs"
+
+
+class IdentitySettings(SettingsModel):
+    """Copies of the recorded places, as in the paper's physical experiment, hardest first."""
+
+    method: Literal["identity"] = "identity"
+
+
+SynthesizerSettings = Annotated[
+    GanSettings | PcaSettings | RandomSamplingSettings | IdentitySettings,
+    Field(discriminator="method"),
+]
+
+
+class SynthesisSettings(SettingsModel):
+    """From thousands of challenging environments to about a hundred (section III-C)."""
+
+    synthesizer: SynthesizerSettings = Field(GanSettings(), description="How they are made.")
+    environments: int = Field(100, ge=1, description="M: environments to train in.")
+    attempts: int = Field(
+        20, ge=1, description="Most samples drawn per environment that can be crossed."
+    )
+    seed: int = Field(0, ge=0, description="Seed of the fit and of the samples.")
+
+
+class SimulationSettings(SettingsModel):
+    """Imperfections and rates of the simulated robot."""
+
+    control_rate_hz: float = Field(20.0, gt=0, description="Planner ticks (controller_frequency).")
+    sensing_rate_hz: float = Field(5.0, gt=0, description="Scans, costmap and plan updates.")
+    range_noise_m: float = Field(0.01, ge=0, description="Standard deviation of a range reading.")
+    actuation_noise: float = Field(0.05, ge=0, description="Relative noise of the wheel speeds.")
+    command_delay_ticks: int = Field(1, ge=0, description="Ticks before a command takes effect.")
+    time_limit_s: float = Field(100.0, gt=0, description="An episode ends here as a time-out.")
+    success_radius_m: float = Field(1.0, gt=0, description="This near the goal is a success.")
+    collisions_end: bool = Field(True, description="Contact ends the episode; else it backs off.")
+    stuck_distance_m: float = Field(0.4, ge=0, description="Less than this moved ...")
+    stuck_time_s: float = Field(40.0, gt=0, description="... within this time is stuck.")
+
+
+class TrainingSettings(SettingsModel):
+    """Fine-tuning of the parameter policy (APPLR)."""
+
+    algorithm: Literal["ppo", "td3", "sac"] = Field("ppo", description="stable-baselines3's.")
+    steps: int = Field(100_000, ge=1, description="Decisions trained, one per second of driving.")
+    seed: int = Field(0, ge=0, description="Seed of weights, exploration and simulation.")
+    learning_rate: float | None = Field(None, gt=0, description="Else the algorithm's preset.")
+    gamma: float = Field(0.98, gt=0, lt=1, description="Discount per decision.")
+    failure_penalty: float = Field(20.0, ge=0, description="Taken off when an episode fails.")
+    parallel_envs: int = Field(100, ge=1, description="Worlds stepped together.")
+    simulator: Literal["batch", "bullet"] = Field("batch", description="Where it is trained.")
+
+
+class EvaluationSettings(SettingsModel):
+    """Paired trials on worlds that the policy has never seen."""
+
+    pairs: int = Field(5, ge=1, description="Start-goal pairs per world larger than a scenario.")
+    trials: int = Field(4, ge=1, description="Trials per pair and policy, each with its own seed.")
+    min_distance_m: float = Field(6.6, gt=0, description="Least straight start-goal distance.")
+    seed: int = Field(0, ge=0, description="Seed of pairs and trials; the same for all policies.")
+    simulator: Literal["batch", "bullet"] = Field("batch", description="Where it is measured.")
+    spot_checks: int = Field(3, ge=0, description="Worlds repeated in PyBullet every night.")
+
+
+class StoreSettings(SettingsModel):
+    """The disk."""
+
+    free_floor_mib: int = Field(1024, ge=0, description="Refuse to start below this free space.")
+    scan_retention_days: int = Field(90, ge=1, description="Scans older than this may be dropped.")
+    artifact_retention_days: int = Field(
+        90, ge=1, description="Fits, worlds and reports older than this may be dropped."
+    )
+
+
+class Settings(SettingsModel):
+    """Everything a night depends on."""
+
+    target_robot: RobotProfile = Field(JACKAL, description="The robot that is trained.")
+    ingest: IngestSettings = IngestSettings()
+    extraction: ExtractionSettings = ExtractionSettings()
+    filter: FilterSettings = FilterSettings()
+    synthesis: SynthesisSettings = SynthesisSettings()
+    simulation: SimulationSettings = SimulationSettings()
+    training: TrainingSettings = TrainingSettings()
+    evaluation: EvaluationSettings = EvaluationSettings()
+    store: StoreSettings = StoreSettings()

@@ -1,0 +1,1 @@
+"""Simulated robots: the compiled batch and the rigid-body one."""

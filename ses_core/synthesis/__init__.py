@@ -1,0 +1,1 @@
+"""From many challenging environments to a representative few (section III-C)."""

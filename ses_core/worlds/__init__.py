@@ -1,0 +1,1 @@
+"""Worlds to drive in, and the fleet that drives in them."""
