@@ -43,10 +43,20 @@ class NavigationEnvironment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
-    """A grid a robot drives in, with the name it has in tables and reports."""
+    """A grid a robot drives in; what lies outside the grid counts as wall.
+
+    Attributes:
+        world_id: The name it has in tables and reports; unlike `name` it is unique.
+        name: What its file or generator calls it.
+        source: Where it came from, e.g. `barn` or `map`.
+        course: Start pose and goal point, where the source fixes them (BARN does).
+    """
 
     world_id: str
     grid: OccupancyGrid
+    name: str = ""
+    source: str = ""
+    course: tuple[Pose2D, tuple[float, float]] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
