@@ -1,0 +1,89 @@
+"""`NightSummary`: what a night did, as `ses nightly --json` prints it and the UI shows it."""
+
+from datetime import date
+
+from pydantic import BaseModel, ConfigDict, Field
+
+STAGES = ("ingest", "extract", "filter", "synthesize", "render", "train", "evaluate", "report")
+"""The stages in order, as `--refresh` names them."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class StageCount(_Part):
+    """How often a stage built something, how often it found it, and how long that took [s]."""
+
+    built: int = 0
+    found: int = 0
+    seconds: float = 0.0
+
+
+class LogCounts(_Part):
+    """What became of the inbox."""
+
+    new: int = 0
+    known: int = 0
+    quarantined: int = 0
+    waiting: int = Field(0, description="Still arriving: left for the next night.")
+    ignored: int = Field(0, description="No logs: other files in the inbox.")
+    unknown_robot: int = Field(0, description="New logs whose robot or site nothing names.")
+
+
+class EvaluationRow(_Part):
+    """One policy's trials on the held-out worlds."""
+
+    policy: str
+    success_rate: float
+    success_ci: tuple[float, float]
+    mean_time_s: float | None
+    restricted_mean_time_s: float
+    collision_rate: float
+    timeout_rate: float
+    stuck_rate: float
+    barn_score: float
+    trials: int
+
+
+class Comparison(_Part):
+    """The new policy against another one, on the same worlds, pairs and seeds."""
+
+    policy: str
+    baseline: str
+    success_difference: float
+    ci: tuple[float, float]
+    time_difference_s: float
+    ci_s: tuple[float, float]
+
+
+class NightSummary(_Part):
+    """One nightly batch; keys are public (see the README)."""
+
+    run_id: str
+    batch_date: date
+    logs: LogCounts = LogCounts()
+    scenarios: int = 0
+    challenging: int = 0
+    challenging_by_count: dict[str, int] = Field(
+        default_factory=dict,
+        description="Challenging scenarios under each count, at the threshold.",
+    )
+    environments: int = 0
+    stages: dict[str, StageCount] = Field(
+        default_factory=lambda: {stage: StageCount() for stage in STAGES}
+    )
+    evaluation: list[EvaluationRow] = Field(default_factory=list)
+    comparisons: list[Comparison] = Field(default_factory=list)
+    decision: str = "nothing-new"
+    reason: str = ""
+    champion: str | None = None
+    policy: str | None = None
+    report: str | None = None
+
+    def count(self, stage: str, *, found: bool, seconds: float) -> None:
+        """Add one task's outcome to its stage."""
+        counts = self.stages[stage]
+        counts.found += found
+        counts.built += not found
+        counts.seconds = round(counts.seconds + seconds, 3)
