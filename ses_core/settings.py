@@ -112,6 +112,18 @@ class GanSettings(SettingsModel):
     epochs: int = Field(200, ge=1, description="Passes over the challenging environments.")
     batch_size: int = Field(64, ge=2, description="Environments per update.")
     learning_rate: float = Field(2e-4, gt=0, description="Of both Adam optimisers.")
+    adam_beta1: float = Field(0.5, ge=0, lt=1, description="First-moment decay of both optimisers.")
+    leaky_slope: float = Field(0.2, gt=0, lt=1, description="Negative slope of the leaky ReLUs.")
+    loss: Literal["saturating", "non-saturating"] = Field(
+        "saturating",
+        description="The generator minimises log(1 - D(G(z))) as printed, or -log D(G(z)).",
+    )
+    least_updates: int = Field(
+        3000, ge=1, description="Updates made even where the epochs would make fewer."
+    )
+    least_environments: int = Field(
+        30, ge=2, description="With fewer to learn from, the recorded places are copied instead."
+    )
 
 
 class PcaSettings(SettingsModel):

@@ -1,0 +1,42 @@
+"""SES-RS: the uniform distribution over the challenging environments (section III-C)."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from ses_core.arrays import BoolArray
+from ses_core.navigation import NavigationDomain
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedRandomSampling:
+    """Draws recorded environments; cells: (N, 30, 30)."""
+
+    cells: BoolArray
+
+    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+        """Draw without replacement; fewer than `count` where there are no more."""
+        return self.cells[rng.permutation(len(self.cells))[:count]]
+
+    def arrays(self) -> Mapping[str, NDArray[np.generic]]:
+        """Give what rebuilds it."""
+        return {"cells": self.cells}
+
+
+@dataclass(frozen=True, slots=True)
+class RandomSampling:
+    """Learns nothing: it keeps the environments."""
+
+    def fit(
+        self,
+        domain: NavigationDomain,
+        *,
+        rng: Generator,  # noqa: ARG002  (the seam's: nothing is drawn here)
+        progress: Callable[[float], None],
+    ) -> FittedRandomSampling:
+        """Keep the domain's cells."""
+        progress(1.0)
+        return FittedRandomSampling(cells=domain.cells())
