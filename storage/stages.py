@@ -1,0 +1,36 @@
+"""Every stage's name and version, in one table.
+
+Raise a stage's version whenever its output for the same inputs would mean something else:
+its artifacts, and whatever was made from them, are then built anew.
+"""
+
+from ses_core.recipes import Stage
+
+INGEST = Stage("ingest", 1)
+EXTRACT = Stage("extract", 1)
+FILTER = Stage("filter", 1)
+FIT = Stage("fit", 1)
+SYNTHESIZE = Stage("synthesize", 1)
+RENDER = Stage("render", 1)
+TRAIN = Stage("train", 1)
+EVALUATE = Stage("evaluate", 1)
+REPORT = Stage("report", 1)
+PRETRAIN = Stage("pretrain", 1)
+DEPLOY = Stage("deploy", 1)
+
+STAGES = (
+    INGEST,
+    EXTRACT,
+    FILTER,
+    FIT,
+    SYNTHESIZE,
+    RENDER,
+    TRAIN,
+    EVALUATE,
+    REPORT,
+    PRETRAIN,
+    DEPLOY,
+)
+
+DISPOSABLE_STAGES = (FIT, RENDER, REPORT)
+"""Stages whose artifacts only serve their own night: dropped when long unused."""
