@@ -3,31 +3,49 @@
 import errno
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ses_core.errors import ArtifactError
 from storage.disk_space import free_bytes
 
+MACHINE_FAULTS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG})
+"""What the operating system reports when this machine is to blame, never the data."""
+
 _TEMPORARY_SUFFIX = ".part"
 
 
 @contextmanager
-def disk_errors(path: Path) -> Iterator[None]:
+def disk_errors(path: Path, *, only: Container[int] | None = None) -> Iterator[None]:
     """Turn a fault of the disk into an error that names the path and the space left.
 
+    Args:
+        path: Named where the operating system names no file.
+        only: Error numbers to turn; all of them by default.
+
     Raises:
-        ArtifactError: Anything the operating system reported inside the block.
+        ArtifactError: What the operating system reported inside the block.
     """
     try:
         yield
     except OSError as error:
+        if only is not None and error.errno not in only:
+            raise
         where = error.filename if isinstance(error.filename, str) else path
         reason = error.strerror or str(error) or type(error).__name__
         raise ArtifactError(
             f"{where}: {reason[0].lower()}{reason[1:]} ({free_bytes(path)} bytes free)"
         ) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, each on the disk before anything lies in it."""
+    if folder.is_dir():
+        return
+    make_folder(folder.parent)
+    folder.mkdir(exist_ok=True)
+    sync_folder(folder.parent)
 
 
 def temporary_name(path: Path) -> Path:
@@ -55,7 +73,7 @@ def write_if_absent(path: Path, content: bytes) -> bool:
         ArtifactError: The disk is full or failing.
     """
     with disk_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         temporary = temporary_name(path)
         try:
             _write_synced(temporary, content)
@@ -76,7 +94,7 @@ def replace_file(path: Path, content: bytes) -> None:
         ArtifactError: The disk is full or failing; what was there is still there.
     """
     with disk_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         temporary = temporary_name(path)
         try:
             _write_synced(temporary, content)

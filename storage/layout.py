@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ses_core.errors import ArtifactError
 from ses_core.recipes import ArtifactRef
-from storage.durable_files import disk_errors, write_if_absent
+from storage.durable_files import disk_errors, make_folder, write_if_absent
 
 STORE_FORMAT = 1
 """Form of the folders and files under a root; raised whenever an older release would misread it."""
@@ -131,7 +131,7 @@ def open_layout(root: Path) -> Layout:
             layout.staging,
             layout.batches,
         ):
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
         if not layout.store_file.exists():
             write_if_absent(layout.store_file, json.dumps({"format": STORE_FORMAT}).encode())
         text = layout.store_file.read_text()
