@@ -188,6 +188,20 @@ class TrainingSettings(SettingsModel):
     gamma: float = Field(0.98, gt=0, lt=1, description="Discount per decision.")
     failure_penalty: float = Field(20.0, ge=0, description="Taken off when an episode fails.")
     parallel_envs: int = Field(100, ge=1, description="Worlds stepped together.")
+    preset: Literal["default", "authors"] = Field(
+        "default",
+        description="Observation and network of a policy without a parent, and the algorithm's "
+        "constants: ours, or those of the authors' code.",
+    )
+    critic_share: float = Field(
+        0.1, ge=0, lt=1, description="Share of a fine-tuning that trains the new critic alone."
+    )
+    start_yaw_jitter_rad: float = Field(
+        0.3, ge=0, description="A start is turned by up to this, either way."
+    )
+    start_sideways_jitter_m: float = Field(
+        0.1, ge=0, description="A start is shifted by up to this, either way."
+    )
     simulator: Literal["batch", "bullet"] = Field("batch", description="Where it is trained.")
 
 

@@ -1,0 +1,250 @@
+"""Paired trials: several policies on the same worlds, pairs and seeds."""
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ses_core.evaluation.outcomes import EpisodeOutcome
+from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters, observer_for
+from ses_core.navigation import NavigationTask
+from ses_core.planning.global_planner import optimal_path_length
+from ses_core.protocols import Policy, Simulator
+from ses_core.recipes import digest_json
+from ses_core.robot_profile import RobotProfile
+from ses_core.settings import SimulationSettings
+from ses_core.simulation.factory import make_simulator
+
+BARN_SPEED_MPS = 2.0
+"""Speed at which the optimal path is taken to be driven (the-barn-challenge, `run.py`)."""
+
+BARN_FASTEST, BARN_SLOWEST = 2.0, 8.0
+"""Times are clipped to these multiples of the optimal time: BARN since 2023; 4 and 8 in 2022."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluationTask:
+    """One start-goal pair of a held-out world.
+
+    Attributes:
+        pair: Number of the pair within its world.
+        optimal_time_s: Shortest drivable path at 2 m/s [s].
+    """
+
+    world_id: str
+    pair: int
+    task: NavigationTask
+    optimal_time_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episode:
+    """One trial; the fields are the columns of the table `episodes`."""
+
+    episode_id: str
+    run_id: str
+    policy: str
+    world_id: str
+    pair: int
+    trial: int
+    seed: int
+    outcome: str
+    time_s: float
+    path_length_m: float
+    optimal_time_s: float
+    barn_score: float
+    negative_velocity_count: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """A trial still to be driven; it is the same for every policy."""
+
+    place: EvaluationTask
+    number: int
+    seed: int
+
+
+def evaluation_task(task: NavigationTask, *, pair: int, profile: RobotProfile) -> EvaluationTask:
+    """Measure a task's shortest path on the true map and make it a pair of its world.
+
+    Where no path is wide enough for the robot, the straight line stands in: the trial counts
+    as any other, and will fail.
+    """
+    start = (task.start.x, task.start.y)
+    length = optimal_path_length(
+        task.world.grid, start, task.goal, radius=profile.inscribed_radius_m
+    )
+    if not np.isfinite(length):
+        length = float(np.hypot(task.goal[0] - start[0], task.goal[1] - start[1]))
+    return EvaluationTask(
+        world_id=task.world.world_id,
+        pair=pair,
+        task=task,
+        optimal_time_s=length / BARN_SPEED_MPS,
+    )
+
+
+def evaluate(
+    policies: Mapping[str, Policy],
+    places: Sequence[EvaluationTask],
+    *,
+    trials: int,
+    seed: int,
+    simulation: SimulationSettings,
+    profile: RobotProfile,
+    simulator: str = "batch",
+    slots: int = 64,
+    run_id: str = "",
+    progress: Callable[[float], None] = lambda _: None,
+) -> list[Episode]:
+    """Drive every policy through the same trials.
+
+    The seed of a trial depends on the evaluation's seed, world, pair and trial alone: neither
+    the policies nor the places beside it, nor the number of slots, change an episode.
+
+    Args:
+        policies: By the name they have in tables, in the order they are to be compared.
+        places: Start-goal pairs, no two alike in world and pair.
+        trials: Trials of each pair and policy.
+        seed: Seed of the whole evaluation.
+        simulation: Rates and imperfections of the robot.
+        profile: The robot.
+        simulator: Name of the simulator (`batch` or `bullet`).
+        slots: Episodes driven side by side.
+        run_id: The run that the episodes belong to.
+        progress: Hears the share that is done, from 0 to 1.
+
+    Returns:
+        Episodes by policy, place and trial, in the order given.
+
+    Raises:
+        ValueError: Two places have the same world and pair.
+    """
+    pairs = [(place.world_id, place.pair) for place in places]
+    if len(set(pairs)) < len(pairs):
+        raise ValueError(f"{len(pairs)} places have {len(set(pairs))} different worlds and pairs")
+    schedule = [
+        _Trial(place, number, _trial_seed(seed, place, number))
+        for place in places
+        for number in range(trials)
+    ]
+    if not schedule:
+        return []
+    total = len(schedule) * len(policies)
+    episodes: list[Episode] = []
+    driver = make_simulator(
+        simulator, slots=min(slots, len(schedule)), profile=profile, settings=simulation
+    )
+    try:
+        for name, policy in policies.items():
+            before = len(episodes)
+            episodes += _drive(
+                name,
+                policy,
+                schedule,
+                driver,
+                profile=profile,
+                run_id=run_id,
+                finished=partial(_report, progress, before, total),
+            )
+    finally:
+        driver.close()
+    return episodes
+
+
+def _report(progress: Callable[[float], None], before: int, total: int, count: int) -> None:
+    progress((before + count) / total)
+
+
+def _drive(
+    name: str,
+    policy: Policy,
+    schedule: Sequence[_Trial],
+    simulator: Simulator,
+    *,
+    profile: RobotProfile,
+    run_id: str,
+    finished: Callable[[int], None],
+) -> list[Episode]:
+    """Drive one policy through the schedule, refilling slots as episodes end."""
+    observer = observer_for(policy, profile)
+    ticks = max(1, round(DECISION_PERIOD_S / simulator.time_step))
+    waiting = deque(range(len(schedule)))
+    driven = np.full(simulator.slots, -1)
+    parameters = initial_parameters(simulator.slots)
+    episodes: dict[int, Episode] = {}
+    idle = np.arange(simulator.slots)
+    while len(episodes) < len(schedule):
+        slots = idle[: len(waiting)]
+        driven[idle] = -1
+        driven[slots] = [waiting.popleft() for _ in slots]
+        if len(slots):
+            trials = [schedule[number] for number in driven[slots]]
+            seeds = np.array([trial.seed for trial in trials], dtype=np.int64)
+            simulator.reset(slots, [trial.place.task for trial in trials], seeds)
+            parameters[slots] = initial_parameters(len(slots))
+        observations = observer.observe(simulator.scans(), simulator.state(), parameters)
+        parameters = policy.act(observations)
+        simulator.advance(parameters, ticks)
+        state = simulator.state()
+        idle = np.flatnonzero((state.outcomes != EpisodeOutcome.RUNNING) & (driven >= 0))
+        for slot in idle:
+            episodes[int(driven[slot])] = _episode(
+                schedule[driven[slot]],
+                policy=name,
+                run_id=run_id,
+                outcome=EpisodeOutcome(int(state.outcomes[slot])),
+                time=float(state.times[slot]),
+                path_length=float(state.path_lengths[slot]),
+                negative_count=int(state.negative_counts[slot]),
+            )
+        finished(len(episodes))
+    return [episodes[number] for number in range(len(schedule))]
+
+
+def _episode(
+    trial: _Trial,
+    *,
+    policy: str,
+    run_id: str,
+    outcome: EpisodeOutcome,
+    time: float,
+    path_length: float,
+    negative_count: int,
+) -> Episode:
+    place = trial.place
+    return Episode(
+        episode_id=digest_json(
+            [run_id, policy, place.world_id, place.pair, trial.number, trial.seed]
+        )[:16],
+        run_id=run_id,
+        policy=policy,
+        world_id=place.world_id,
+        pair=place.pair,
+        trial=trial.number,
+        seed=trial.seed,
+        outcome=outcome.name.lower(),
+        time_s=time,
+        path_length_m=path_length,
+        optimal_time_s=place.optimal_time_s,
+        barn_score=barn_score(outcome, time=time, optimal_time=place.optimal_time_s),
+        negative_velocity_count=negative_count,
+    )
+
+
+def barn_score(outcome: EpisodeOutcome, *, time: float, optimal_time: float) -> float:
+    """Score an episode as the BARN challenge does: 0 for a failure, at most 1/2 for a success.
+
+    optimal time / clip(time, 2 x optimal time, 8 x optimal time)
+    """
+    if outcome != EpisodeOutcome.SUCCESS:
+        return 0.0
+    return optimal_time / min(max(time, BARN_FASTEST * optimal_time), BARN_SLOWEST * optimal_time)
+
+
+def _trial_seed(seed: int, place: EvaluationTask, number: int) -> int:
+    """Seed of one trial: 31 bits of the digest of what names it."""
+    return int(digest_json([seed, place.world_id, place.pair, number])[:8], 16) >> 1

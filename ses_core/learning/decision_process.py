@@ -1,0 +1,137 @@
+"""`DecisionProcess`: what one decision does, shared by the Gymnasium env and its vector form."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+
+from ses_core.arrays import Float32Array, FloatArray, IntArray
+from ses_core.geometry import Pose2D, compose
+from ses_core.learning.observation import ObservationSpec, goal_distances, make_observer
+from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters
+from ses_core.learning.reward import rewards
+from ses_core.navigation import NavigationTask
+from ses_core.occupancy import occupied_at
+from ses_core.planning.parameters import decode_action
+from ses_core.protocols import Simulator
+from ses_core.robot_profile import RobotProfile
+from ses_core.settings import TrainingSettings
+
+_BODY_POINTS = 8
+"""Points per edge of the body that must be free where an episode starts."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """What came of one decision of each of N robots.
+
+    Attributes:
+        rewards: (N,).
+        outcomes: `EpisodeOutcome` values (N,); RUNNING while unfinished.
+        times: Time since the start (N,) [s].
+    """
+
+    rewards: FloatArray
+    outcomes: IntArray
+    times: FloatArray
+
+
+class DecisionProcess:
+    """N robots that get new planner parameters once per second of driving.
+
+    Episodes start in tasks drawn from a list, at a start pose that is turned and shifted a
+    little, so that a policy cannot learn one approach by heart.
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator,
+        *,
+        tasks: Sequence[NavigationTask],
+        observation: ObservationSpec,
+        profile: RobotProfile,
+        settings: TrainingSettings,
+        weights: FloatArray | None = None,
+    ) -> None:
+        """Prepare the process; no slot runs before it is restarted.
+
+        Args:
+            simulator: N slots; closed by whoever made it.
+            tasks: What episodes are drawn from.
+            observation: What is seen.
+            profile: The robot.
+            settings: Penalty and jitter.
+            weights: How often each task is drawn, in any scale; equally often without.
+        """
+        if not tasks:
+            raise ValueError("found no task to train in, expected at least one")
+        self.simulator = simulator
+        self.observation = observation
+        self._tasks = list(tasks)
+        self._shares = None if weights is None else weights / weights.sum()
+        self._observer = make_observer(observation, profile)
+        self._profile = profile
+        self._settings = settings
+        self._ticks = max(1, round(DECISION_PERIOD_S / simulator.time_step))
+        self._parameters = initial_parameters(simulator.slots)
+        self._distances = np.zeros(simulator.slots)
+
+    def restart(self, slots: IntArray, *, rng: Generator) -> None:
+        """Start an episode in a task of its own in each of the slots (S,)."""
+        if len(slots) == 0:
+            return
+        drawn = rng.choice(len(self._tasks), size=len(slots), p=self._shares)
+        tasks = [
+            jittered(self._tasks[number], profile=self._profile, settings=self._settings, rng=rng)
+            for number in drawn
+        ]
+        self.simulator.reset(slots, tasks, rng.integers(2**31, size=len(slots)))
+        self._parameters[slots] = initial_parameters(len(slots))
+        self._distances[slots] = goal_distances(self.simulator.state())[slots]
+
+    def observe(self) -> Float32Array:
+        """Give what every robot sees now: (N, D)."""
+        observations = self._observer.observe(
+            self.simulator.scans(), self.simulator.state(), self._parameters
+        )
+        return observations.astype(np.float32)
+
+    def decide(self, actions: FloatArray) -> Decision:
+        """Set parameters from actions (N, 7) in [-1, 1] and drive for a second."""
+        self._parameters = decode_action(np.asarray(actions, dtype=np.float64))
+        self.simulator.advance(self._parameters, self._ticks)
+        state = self.simulator.state()
+        before, self._distances = self._distances, goal_distances(state)
+        return Decision(
+            rewards=rewards(
+                before,
+                self._distances,
+                state.outcomes,
+                failure_penalty=self._settings.failure_penalty,
+            ),
+            outcomes=state.outcomes,
+            times=state.times,
+        )
+
+
+def jittered(
+    task: NavigationTask, *, profile: RobotProfile, settings: TrainingSettings, rng: Generator
+) -> NavigationTask:
+    """Turn and shift a task's start at random; left as it is where the body would not fit."""
+    yaw = rng.uniform(-1.0, 1.0) * settings.start_yaw_jitter_rad
+    sideways = rng.uniform(-1.0, 1.0) * settings.start_sideways_jitter_m
+    start = compose(task.start, Pose2D(0.0, sideways, yaw))
+    if occupied_at(task.world.grid, _outline(start, profile)).any():
+        return task
+    return replace(task, start=start)
+
+
+def _outline(pose: Pose2D, profile: RobotProfile) -> FloatArray:
+    """Points (P, 2) [m] along the edge of the padded body at a pose."""
+    corners = np.array(profile.padded_footprint())
+    along = np.linspace(0.0, 1.0, _BODY_POINTS, endpoint=False)[:, None, None]
+    edge = ((1.0 - along) * corners + along * np.roll(corners, -1, axis=0)).reshape(-1, 2)
+    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
+    return edge @ np.array([[cosine, sine], [-sine, cosine]]) + np.array([pose.x, pose.y])
