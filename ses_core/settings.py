@@ -76,6 +76,9 @@ class ExtractionSettings(SettingsModel):
     hit_share: float = Field(
         0.25, gt=0, lt=1, description="Occupied from this share of hits among its beams."
     )
+    hit_minimum: int = Field(
+        2, ge=1, description="Occupied needs hits in at least this many scans."
+    )
     scan_margin_s: float = Field(
         1.0, ge=0, description="Scans this long before and after a scenario are used and kept."
     )
