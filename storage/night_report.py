@@ -1,0 +1,210 @@
+"""`NightReport`: everything the page of one night shows, as plain data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ses_core.arrays import BoolArray, FloatArray, IntArray
+from ses_core.evaluation.comparison import Comparison
+from ses_core.evaluation.statistics import PolicySummary
+from ses_core.pictures.funnel import FunnelStep
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TakenLog:
+    """A log that was taken in; its name and robot are whatever its uploader wrote."""
+
+    name: str
+    robot: str
+    site: str
+    format: str
+    duration_s: float
+    path_length_m: float
+    scenarios: int
+    challenging: int
+    warnings: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RefusedLog:
+    """A log in quarantine: its reason from the closed list, and that in plain words."""
+
+    name: str
+    reason: str
+    explanation: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Funnel:
+    """From logs to environments.
+
+    Attributes:
+        steps: Levels of the funnel, widest first.
+        rule: What made a scenario challenging tonight, in words.
+        count_name: The count that chose, in words.
+        other_name: The count printed beside it, in words.
+        remarks: What else to know: held-out places, unknown velocities, caps that were reached.
+    """
+
+    steps: tuple[FunnelStep, ...]
+    rule: str
+    count_name: str
+    other_name: str
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensitivity:
+    """Challenging scenarios by threshold: thresholds (T,), counts (T,) by kind of count."""
+
+    thresholds: FloatArray
+    challenging: Mapping[str, IntArray]
+    threshold: float
+    scenario_count: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShownEnvironment:
+    """One picture of a gallery; cells and observed: (30, 30)."""
+
+    environment_id: str
+    cells: BoolArray
+    observed: BoolArray
+    caption: str = ""
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageUse:
+    """How often a stage built something, how often it found it, and how long that took."""
+
+    name: str
+    built: int
+    found: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SynthesisUse:
+    """How the training environments came to be; see `SynthesisResult`."""
+
+    method_asked: str
+    method_used: str
+    drawn: int
+    rejected_share: float
+    repeated: int
+    copied: int
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainingUse:
+    """What was trained; `learning_curve` is a PNG."""
+
+    policy: str
+    parent: str
+    algorithm: str
+    decisions: int
+    environments: int
+    seconds: float
+    learning_curve: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluationUse:
+    """Trials on held-out worlds: rows in the order they are shown; `figure` is a PNG."""
+
+    rows: tuple[PolicySummary, ...]
+    comparisons: tuple[Comparison, ...]
+    worlds: int
+    remarks: tuple[str, ...] = ()
+    figure: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """What was decided about the new policy, and why.
+
+    Attributes:
+        verdict: Two or three words, such as `insufficient evidence`.
+        reasons: Whole sentences.
+        is_promoted: Whether the new policy is the champion now.
+    """
+
+    verdict: str
+    reasons: tuple[str, ...]
+    is_promoted: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedPicture:
+    """A PNG to look at, with what it shows."""
+
+    title: str
+    png: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NightReport:
+    """One night.
+
+    Attributes:
+        challenging: Chosen environments, hardest first; the page shows the first ones.
+        synthesized: Environments that were trained in.
+        pictures: Further pictures: logs over their paths, rendered worlds.
+        lineage: What was made from what: names and digests, in order.
+        demonstration_decisions: Decisions trained, when the night is a demonstration.
+    """
+
+    run_id: str
+    batch_date: str
+    decision: Decision
+    logs: tuple[TakenLog, ...] = ()
+    refused: tuple[RefusedLog, ...] = ()
+    known_logs: int = 0
+    waiting_logs: int = 0
+    funnel: Funnel | None = None
+    sensitivity: Sensitivity | None = None
+    challenging: tuple[ShownEnvironment, ...] = ()
+    synthesis: SynthesisUse | None = None
+    synthesized: tuple[ShownEnvironment, ...] = ()
+    training: TrainingUse | None = None
+    evaluation: EvaluationUse | None = None
+    champion: str | None = None
+    stages: tuple[StageUse, ...] = ()
+    pictures: tuple[NamedPicture, ...] = ()
+    lineage: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[str, ...] = ()
+    demonstration_decisions: int | None = None
+
+
+def headline(report: NightReport) -> str:
+    """Say in one sentence what the night came to."""
+    training, evaluation = report.training, report.evaluation
+    if training is None:
+        if not report.logs and not report.refused:
+            return "No new logs came in, so there was nothing to learn from."
+        if not report.logs:
+            return f"{_count(len(report.refused), 'log')} came in and none could be read."
+        return f"{_count(len(report.logs), 'new log')} read, and no policy trained."
+    trained = f"A policy was trained in {_count(training.environments, 'environment')}"
+    comparison = _against_parent(training.parent, evaluation)
+    if evaluation is None or comparison is None:
+        return f"{trained}, and could not be measured against the one it came from."
+    rates = {row.policy: row.success_rate for row in evaluation.rows}
+    ending = "it is the champion now" if report.decision.is_promoted else "nothing was promoted"
+    return (
+        f"{trained}. On worlds it had never seen it succeeds in "
+        f"{100.0 * rates[comparison.policy]:.0f} % of trials, the policy it came from in "
+        f"{100.0 * rates[comparison.baseline]:.0f} %: {report.decision.verdict}, {ending}."
+    )
+
+
+def _against_parent(parent: str, evaluation: EvaluationUse | None) -> Comparison | None:
+    if evaluation is None:
+        return None
+    by_baseline = {comparison.baseline: comparison for comparison in evaluation.comparisons}
+    return by_baseline.get(parent)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
