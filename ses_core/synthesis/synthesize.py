@@ -1,6 +1,6 @@
 """From challenging environments to the ones a policy trains in (section III-C)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +36,7 @@ class SynthesisResult:
         drawn: Samples looked at.
         rejected_share: Share of them that the target robot cannot cross.
         repeated: Samples passed over because they equal one already taken.
-        copied: How many of the environments equal a recorded one.
+        copies: By environment, the scenario whose recorded place it equals cell by cell.
         notes: Where the result departs from what was asked, in words.
     """
 
@@ -46,7 +46,7 @@ class SynthesisResult:
     drawn: int
     rejected_share: float
     repeated: int
-    copied: int
+    copies: Mapping[str, str]
     notes: tuple[str, ...]
 
 
@@ -109,9 +109,7 @@ def draw_environments(
         for environment in reversed(domain.environments)
     }
     method = plan.synthesizer.method
-    environments = tuple(
-        _environment(cells[index], method=method, recorded=recorded) for index in taken
-    )
+    environments = tuple(_environment(cells[index], method=method) for index in taken)
     notes = list(plan.notes)
     if len(taken) < plan.environments:
         notes.append(
@@ -125,7 +123,11 @@ def draw_environments(
         drawn=drawn,
         rejected_share=1.0 - crossable / drawn,
         repeated=repeated,
-        copied=sum(cells[index].tobytes() in recorded for index in taken),
+        copies={
+            environment.environment_id: recorded[environment.cells.tobytes()]
+            for environment in environments
+            if environment.cells.tobytes() in recorded
+        },
         notes=tuple(notes),
     )
 
@@ -155,15 +157,11 @@ def _take(cells: BoolArray, *, count: int, radius: float) -> tuple[list[int], in
     return taken, drawn, crossable, repeated
 
 
-def _environment(
-    cells: BoolArray, *, method: str, recorded: dict[bytes, str]
-) -> NavigationEnvironment:
-    """Name an environment by how it was made, what it copies, and its cells."""
-    scenario_id = recorded.get(cells.tobytes(), "")
+def _environment(cells: BoolArray, *, method: str) -> NavigationEnvironment:
+    """Name an environment by how it was made and by its cells."""
     return NavigationEnvironment(
-        environment_id=digest_json([method, scenario_id, np.packbits(cells).tobytes().hex()])[:16],
+        environment_id=digest_json([method, "", np.packbits(cells).tobytes().hex()])[:16],
         cells=cells,
         observed=np.ones_like(cells),
         origin=method,
-        scenario_id=scenario_id,
     )
