@@ -1,0 +1,222 @@
+"""PPO, TD3 and SAC behind one shape of actor (leaf: stable-baselines3, torch).
+
+Every learner's actor is the perceptron of `ParameterPolicy`: rectified layers and a hyperbolic
+tangent, so that any of them can go on from what any other has trained.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
+
+from ses_core.arrays import Float32Array
+from ses_core.learning.observation import ObservationSpec
+from ses_core.learning.policies import ParameterPolicy
+from ses_core.planning.parameters import PARAMETER_NAMES
+from ses_core.settings import TrainingSettings
+
+_ROLLOUT = 32
+"""Decisions of each robot between two updates of PPO: about one episode and a half."""
+
+_MINIBATCHES = 4
+_EXPLORATION = {"scratch": 0.6, "fine-tuning": 0.3}
+"""Standard deviation of PPO's and SAC's first actions, in units of the action."""
+
+_NOISE = (0.2, 0.05)
+"""TD3's exploration, from first to last decision (ros_jackal's `configs/laser.yaml`)."""
+
+_BUFFER = 200_000
+"""Transitions kept by TD3 and SAC (ros_jackal's `configs/laser.yaml`)."""
+
+
+class _SquashedMeanPolicy(ActorCriticPolicy):
+    """PPO's policy with a hyperbolic tangent on the mean, as TD3's actor has it."""
+
+    def _build(self, lr_schedule: Callable[[float], float]) -> None:
+        super()._build(lr_schedule)
+        self.action_net = nn.Sequential(self.action_net, nn.Tanh())
+
+
+class _FadingNoise(NormalActionNoise):
+    """Exploration whose standard deviation falls from one value to another."""
+
+    def __init__(self, first: float, last: float, *, decisions: int) -> None:
+        shape = (len(PARAMETER_NAMES),)
+        super().__init__(mean=np.zeros(shape), sigma=np.full(shape, first))
+        self._first, self._last, self._decisions, self._made = first, last, decisions, 0
+
+    def __call__(self) -> NDArray[Any]:
+        share = min(1.0, self._made / self._decisions)
+        self._sigma[:] = self._first + share * (self._last - self._first)
+        self._made += 1
+        return super().__call__()
+
+
+def make_learner(
+    env: VecEnv, start: ParameterPolicy, *, settings: TrainingSettings, is_fine_tuning: bool
+) -> tuple[BaseAlgorithm, int]:
+    """Make a learner whose actor starts as a policy.
+
+    Args:
+        env: What it learns in.
+        start: The policy it starts from; sizes and observation are taken from it.
+        settings: Algorithm, constants and decisions.
+        is_fine_tuning: Explore less, for the start is already good.
+
+    Returns:
+        The learner, and the decisions it can make in whole rollouts.
+    """
+    make = {"ppo": _make_ppo, "td3": _make_td3, "sac": _make_sac}[settings.algorithm]
+    deviation = _EXPLORATION["fine-tuning" if is_fine_tuning else "scratch"]
+    learner, decisions = make(env, list(start.hidden_sizes), settings, math.log(deviation))
+    with torch.no_grad():
+        for layer, matrix, bias in zip(
+            actor_layers(learner), start.weights, start.biases, strict=True
+        ):
+            layer.weight.copy_(torch.from_numpy(matrix))
+            layer.bias.copy_(torch.from_numpy(bias))
+        if isinstance(learner, TD3):
+            learner.actor_target.load_state_dict(learner.actor.state_dict())
+        if isinstance(learner, SAC):
+            _deviation_layer(learner).weight.zero_()
+            _deviation_layer(learner).bias.fill_(math.log(deviation))
+    return learner, decisions
+
+
+def actor_layers(learner: BaseAlgorithm) -> list[nn.Linear]:
+    """Give the linear layers from the observation to the mean action."""
+    if isinstance(learner, PPO):
+        parts = [learner.policy.mlp_extractor.policy_net, learner.policy.action_net]
+    elif isinstance(learner, SAC):
+        parts = [learner.actor.latent_pi, learner.actor.mu]
+    elif isinstance(learner, TD3):
+        parts = [learner.actor.mu]
+    else:
+        raise ValueError(
+            f"found a learner of type {type(learner).__name__}, expected PPO, TD3, SAC"
+        )
+    return [layer for part in parts for layer in part.modules() if isinstance(layer, nn.Linear)]
+
+
+def actor_parameters(learner: BaseAlgorithm) -> list[nn.Parameter]:
+    """Give all that is frozen while a new critic is trained alone."""
+    own = [parameter for layer in actor_layers(learner) for parameter in layer.parameters()]
+    if isinstance(learner, PPO):
+        return [*own, learner.policy.log_std]
+    if isinstance(learner, SAC):
+        return [*own, *_deviation_layer(learner).parameters()]
+    return own
+
+
+def extract_policy(learner: BaseAlgorithm, observation: ObservationSpec) -> ParameterPolicy:
+    """Copy a learner's actor into a policy that needs no torch."""
+    layers = actor_layers(learner)
+
+    def copied(tensor: torch.Tensor) -> Float32Array:
+        return tensor.detach().cpu().numpy().astype(np.float32, copy=True)
+
+    return ParameterPolicy(
+        observation=observation,
+        weights=tuple(copied(layer.weight) for layer in layers),
+        biases=tuple(copied(layer.bias) for layer in layers),
+    )
+
+
+def _deviation_layer(learner: SAC) -> nn.Linear:
+    return cast("nn.Linear", learner.actor.log_std)
+
+
+def _make_ppo(
+    env: VecEnv, hidden: list[int], settings: TrainingSettings, log_deviation: float
+) -> tuple[PPO, int]:
+    """Make PPO, whose rollouts are cut so that they make up the decisions asked for."""
+    rollouts = max(1, round(settings.steps / (_ROLLOUT * env.num_envs)))
+    whole = settings.steps // (_MINIBATCHES * env.num_envs * rollouts)
+    length = _MINIBATCHES * max(1, whole)
+    first_rate = settings.learning_rate or 3e-4
+    learner = PPO(
+        _SquashedMeanPolicy,
+        env,
+        learning_rate=lambda remaining: first_rate * (0.1 + 0.9 * remaining),
+        n_steps=length,
+        batch_size=length * env.num_envs // _MINIBATCHES,
+        n_epochs=5,
+        gamma=settings.gamma,
+        target_kl=0.03,
+        policy_kwargs={
+            "net_arch": {"pi": hidden, "vf": hidden},
+            "activation_fn": nn.ReLU,
+            "log_std_init": log_deviation,
+        },
+        seed=settings.seed,
+        device="cpu",
+    )
+    return learner, rollouts * length * env.num_envs
+
+
+def _make_td3(
+    env: VecEnv, hidden: list[int], settings: TrainingSettings, _: float
+) -> tuple[TD3, int]:
+    """Make TD3; the authors' one-rate form, for stable-baselines3 has no second learning rate."""
+    rounds = max(1, settings.steps // env.num_envs)
+    learner = TD3(
+        "MlpPolicy",
+        env,
+        **_off_policy(env, hidden, settings, rounds=rounds, rate=1e-4, authors_rate=1e-5),
+        action_noise=_FadingNoise(*_NOISE, decisions=rounds),
+        policy_delay=2,
+    )
+    return learner, rounds * env.num_envs
+
+
+def _make_sac(
+    env: VecEnv, hidden: list[int], settings: TrainingSettings, _: float
+) -> tuple[SAC, int]:
+    """Make SAC with its entropy weight learned from a small one."""
+    rounds = max(1, settings.steps // env.num_envs)
+    learner = SAC(
+        "MlpPolicy",
+        env,
+        **_off_policy(env, hidden, settings, rounds=rounds, rate=3e-4, authors_rate=1e-5),
+        ent_coef="auto_0.02",
+    )
+    return learner, rounds * env.num_envs
+
+
+def _off_policy(
+    env: VecEnv,
+    hidden: list[int],
+    settings: TrainingSettings,
+    *,
+    rounds: int,
+    rate: float,
+    authors_rate: float,
+) -> dict[str, Any]:
+    """Give what TD3 and SAC have in common.
+
+    The authors make one update per decision, with returns over 4 decisions; a quarter of the
+    updates costs a quarter of the time and teaches nearly as much (their later code does it).
+    """
+    is_authors = settings.preset == "authors"
+    return {
+        "learning_rate": settings.learning_rate or (authors_rate if is_authors else rate),
+        "buffer_size": max(env.num_envs, min(_BUFFER, rounds * env.num_envs)),
+        "learning_starts": 0,
+        "batch_size": 128,
+        "gamma": settings.gamma,
+        "train_freq": 1,
+        "gradient_steps": max(1, round(env.num_envs * (1.0 if is_authors else 0.25))),
+        "n_steps": 4 if is_authors else 1,
+        "policy_kwargs": {"net_arch": hidden, "activation_fn": nn.ReLU},
+        "seed": settings.seed,
+        "device": "cpu",
+    }

@@ -1,0 +1,123 @@
+"""Training the parameter policy, from its parent or from nothing (leaf: torch)."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from ses_core.arrays import FloatArray
+from ses_core.learning.algorithms import extract_policy, make_learner
+from ses_core.learning.decision_process import DecisionProcess
+from ses_core.learning.observation import OBSERVATIONS
+from ses_core.learning.policies import HIDDEN_SIZES, ParameterPolicy, random_policy
+from ses_core.learning.training_curve import CurvePoint
+from ses_core.learning.training_monitor import StopReason, TrainingMonitor
+from ses_core.learning.vector_env import VectorNavigationEnv
+from ses_core.navigation import NavigationTask
+from ses_core.robot_profile import RobotProfile
+from ses_core.settings import SimulationSettings, TrainingSettings
+from ses_core.simulation.factory import make_simulator
+
+_LEAST_ROUNDS = 16
+"""A training shorter than this many decisions of each robot gets fewer robots."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrainingResult:
+    """What a training gave.
+
+    Attributes:
+        curve: Learning curve, oldest stretch first.
+        steps: Decisions made.
+        seconds: Wall time [s].
+        reason: Why it ended; `diverged` hands out the best policy on the way.
+    """
+
+    policy: ParameterPolicy
+    curve: tuple[CurvePoint, ...]
+    steps: int
+    seconds: float
+    reason: StopReason
+
+
+def train(
+    tasks: Sequence[NavigationTask],
+    *,
+    parent: ParameterPolicy | None,
+    settings: TrainingSettings,
+    simulation: SimulationSettings,
+    profile: RobotProfile,
+    weights: FloatArray | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+    deadline: Callable[[], bool] = lambda: False,
+) -> TrainingResult:
+    """Train a policy in tasks (section IV-A, APPLR).
+
+    A parent's actor is gone on with, under its own observation and sizes. Its critic is not
+    kept: for the first `critic_share` of the decisions the new critic learns alone, so that
+    what it does not know yet cannot spoil the actor.
+
+    Equal arguments give equal weights on one machine.
+
+    Args:
+        tasks: What episodes are drawn from.
+        parent: The policy to go on from; None trains from random weights.
+        settings: Algorithm, decisions, seed.
+        simulation: Rates and imperfections of the robot.
+        profile: The robot.
+        weights: How often each task is drawn; equally often without.
+        progress: Hears the share that is done, from 0 to 1.
+        deadline: Asked after every second of driving; the training ends when it says yes.
+
+    Raises:
+        ValueError: There is no task.
+    """
+    started = time.perf_counter()
+    streams = np.random.SeedSequence(settings.seed).spawn(2)
+    start = parent or random_policy(
+        OBSERVATIONS[settings.preset],
+        HIDDEN_SIZES[settings.preset],
+        rng=np.random.default_rng(streams[0]),
+    )
+    slots = min(settings.parallel_envs, max(1, settings.steps // _LEAST_ROUNDS))
+    simulator = make_simulator(
+        settings.simulator, slots=slots, profile=profile, settings=simulation
+    )
+    threads = torch.get_num_threads()
+    # With more, torch and the simulator's threads take turns on the same cores: measured slower.
+    torch.set_num_threads(1)
+    try:
+        process = DecisionProcess(
+            simulator,
+            tasks=tasks,
+            observation=start.observation,
+            profile=profile,
+            settings=settings,
+            weights=weights,
+        )
+        env = VectorNavigationEnv(process, rng=np.random.default_rng(streams[1]))
+        learner, decisions = make_learner(
+            env, start, settings=settings, is_fine_tuning=parent is not None
+        )
+        monitor = TrainingMonitor(
+            observation=start.observation,
+            decisions=decisions,
+            frozen_decisions=round(settings.critic_share * decisions) if parent else 0,
+            progress=progress,
+            deadline=deadline,
+        )
+        learner.learn(decisions, callback=monitor)
+        final = extract_policy(learner, start.observation)
+    finally:
+        torch.set_num_threads(threads)
+        simulator.close()
+    progress(1.0)
+    return TrainingResult(
+        policy=(monitor.best or start) if monitor.reason == "diverged" else final,
+        curve=tuple(monitor.curve),
+        steps=learner.num_timesteps,
+        seconds=time.perf_counter() - started,
+        reason=monitor.reason,
+    )
