@@ -42,6 +42,9 @@ COURSE_ORIGIN = (-4.5, 0.0)
 
 _CORRIDOR_CELLS = 34
 _OPEN_CELLS = 30
+COURSE_SHAPE = (_CORRIDOR_CELLS + FIELD_CELLS + _OPEN_CELLS, FIELD_CELLS)
+"""Cells of the course along y and x."""
+
 _ROBOT_CELLS = 2
 _HEADINGS = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
 _PATH_CLEARANCE_CELLS = 2.0
@@ -132,8 +135,7 @@ def cross_field(field: BoolArray, *, rng: Generator) -> IntArray | None:
 
 def barn_course(field: BoolArray) -> OccupancyGrid:
     """Stand a field (30, 30) behind BARN's corridor, with 4.5 m of open ground past it."""
-    length = _CORRIDOR_CELLS + FIELD_CELLS + _OPEN_CELLS
-    cells = np.zeros((length, FIELD_CELLS), dtype=np.bool_)
+    cells = np.zeros(COURSE_SHAPE, dtype=np.bool_)
     cells[0] = True
     cells[:_CORRIDOR_CELLS, [0, -1]] = True
     cells[_CORRIDOR_CELLS : _CORRIDOR_CELLS + FIELD_CELLS] = field.T
