@@ -27,6 +27,7 @@ from storage.durable_files import (
 )
 from storage.layout import Layout, open_layout
 from storage.object_files import (
+    FileDroppedError,
     ObjectFile,
     check_content,
     check_size,
@@ -122,7 +123,12 @@ class LocalArtifactStore:
         return self._layout.object_folder(ref)
 
     def file(self, ref: ArtifactRef, name: str) -> Path:
-        """Give one file of an artifact, checking that file alone; see `path`."""
+        """Give one file of an artifact, checking that file alone; see `path`.
+
+        Raises:
+            FileDroppedError: It was given up to save space.
+            ArtifactError: It is missing or damaged.
+        """
         self._check(ref, contents=True, name=name)
         return self._layout.object_folder(ref) / name
 
@@ -169,7 +175,7 @@ class LocalArtifactStore:
                     f"artifact {ref} is damaged: {damage}; moved to {moved}, run again to rebuild"
                 ) from damage
         if name is not None and name in dropped:
-            raise ArtifactError(f"{folder / name} was dropped: it is older than the retention")
+            raise FileDroppedError(f"{folder / name} was dropped: it is older than the retention")
         if name is not None and name not in {file.path for file in files}:
             raise ArtifactError(f"artifact {ref} has no file {name!r}")
         return files

@@ -15,6 +15,11 @@ from ses_core.errors import ArtifactError
 from ses_core.recipes import JsonValue, canonical_json, digest_bytes
 from storage.durable_files import replace_file, sync_file, sync_folder, write_if_absent
 
+
+class FileDroppedError(ArtifactError):
+    """A file of an artifact was given up to save space, on purpose."""
+
+
 MANIFEST_NAME = ".manifest.json"
 
 _DROPPED_NAME = ".dropped.json"
@@ -103,6 +108,20 @@ def check_content(folder: Path, file: ObjectFile) -> None:
     found = digest_file(path)
     if found != file.sha256:
         raise ArtifactError(f"{path} has digest {found}, expected {file.sha256}")
+
+
+def check_object(folder: Path, digest: str) -> None:
+    """Check every byte of an artifact.
+
+    Raises:
+        ArtifactError: A file is missing or not what the digest names.
+    """
+    files = read_manifest(folder, digest)
+    dropped = dropped_files(folder)
+    for file in files:
+        if file.path not in dropped:
+            check_size(folder, file)
+            check_content(folder, file)
 
 
 def digest_file(path: Path) -> str:
