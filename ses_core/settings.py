@@ -105,6 +105,12 @@ class FilterSettings(SettingsModel):
     heldout_share: float = Field(
         0.25, ge=0, lt=1, description="Share of the sites held out for evaluation, by their hash."
     )
+    min_path_in_free_fraction: float = Field(
+        0.9, ge=0, le=1, description="Least share of the robot's own path in free cells."
+    )
+    min_observed_fraction: float = Field(
+        0.25, ge=0, le=1, description="Least share of cells seen; a corridor shows about 0.4."
+    )
 
 
 class GanSettings(SettingsModel):
@@ -172,6 +178,10 @@ class SimulationSettings(SettingsModel):
     control_rate_hz: float = Field(20.0, gt=0, description="Planner ticks (controller_frequency).")
     sensing_rate_hz: float = Field(5.0, gt=0, description="Scans, costmap and plan updates.")
     range_noise_m: float = Field(0.01, ge=0, description="Standard deviation of a range reading.")
+    range_dropout: float = Field(0.0, ge=0, le=1, description="Share of readings lost.")
+    footprint_clearing: bool = Field(
+        True, description="The robot forgets obstacles it stands on (costmap_2d's default)."
+    )
     actuation_noise: float = Field(0.05, ge=0, description="Relative noise of the wheel speeds.")
     command_delay_ticks: int = Field(1, ge=0, description="Ticks before a command takes effect.")
     time_limit_s: float = Field(100.0, gt=0, description="An episode ends here as a time-out.")
