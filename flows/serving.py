@@ -11,6 +11,7 @@ from flows.child_process import PARENT_VARIABLE, child_command, start_child, sto
 from flows.prefect_environment import ServerAddress, enter, prefect_home
 from flows.prefect_server import RunningServer, ServerError, start_server
 from flows.server_announcement import Announcement, announce, the_only_one
+from ses_core.errors import SettingsError
 from ses_core.recipes import JsonValue
 
 WORK_POOL = "ses"
@@ -90,6 +91,9 @@ def offer(flows: Sequence[ServedFlow], directory: Path) -> None:
     Args:
         flows: What to offer; a flow's other deployments are left alone.
         directory: Working directory of the runs.
+
+    Raises:
+        SettingsError: A schedule cannot be read.
     """
     from prefect.client.orchestration import get_client
     from prefect.client.schemas.actions import WorkPoolCreate
@@ -112,7 +116,13 @@ def offer(flows: Sequence[ServedFlow], directory: Path) -> None:
     engine = subprocess.list2cmdline(child_command("prefect.engine"))
     for served in flows:
         flow: Flow[..., object] = getattr(importlib.import_module(served.module), served.function)
-        schedules = [] if served.cron is None else [Cron(served.cron, timezone=served.timezone)]
+        try:
+            schedules = [Cron(served.cron, timezone=served.timezone)] if served.cron else []
+        except ValueError as error:
+            raise SettingsError(
+                f"found schedule {served.cron!r} ({served.timezone}), expected a cron expression "
+                "as '0 2 * * *'"
+            ) from error
         # The annotation of the plain call also allows for a coroutine, which from_flow never gives.
         deployment = RunnerDeployment.from_flow(
             flow,

@@ -1,0 +1,5 @@
+"""`ses bench`: side-by-side benchmarks."""
+
+import typer
+
+app = typer.Typer()
