@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from ses_core.evaluation.episodes import Episode
 from ses_core.evaluation.statistics import Interval, ratio_interval, restricted_time
-from ses_core.evaluation.trials import Episode
 
 LEAST_ENVIRONMENTS = 100
 """With fewer held-out worlds the evidence is insufficient, whatever the figures."""

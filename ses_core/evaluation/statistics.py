@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ses_core.arrays import FloatArray
-from ses_core.evaluation.trials import Episode
+from ses_core.evaluation.episodes import Episode
 
 TIME_CAP_S = 100.0
 """A failure counts as this long in the restricted mean time [s]."""

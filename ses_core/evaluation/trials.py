@@ -4,9 +4,11 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
+from ses_core.evaluation.episodes import BARN_SPEED_MPS, Episode, barn_score
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters, observer_for
 from ses_core.navigation import NavigationTask
@@ -16,12 +18,6 @@ from ses_core.recipes import digest_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.factory import make_simulator
-
-BARN_SPEED_MPS = 2.0
-"""Speed at which the optimal path is taken to be driven (the-barn-challenge, `run.py`)."""
-
-BARN_FASTEST, BARN_SLOWEST = 2.0, 8.0
-"""Times are clipped to these multiples of the optimal time: BARN since 2023; 4 and 8 in 2022."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,25 +33,6 @@ class EvaluationTask:
     pair: int
     task: NavigationTask
     optimal_time_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Episode:
-    """One trial; the fields are the columns of the table `episodes`."""
-
-    episode_id: str
-    run_id: str
-    policy: str
-    world_id: str
-    pair: int
-    trial: int
-    seed: int
-    outcome: str
-    time_s: float
-    path_length_m: float
-    optimal_time_s: float
-    barn_score: float
-    negative_velocity_count: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +72,7 @@ def evaluate(
     seed: int,
     simulation: SimulationSettings,
     profile: RobotProfile,
-    simulator: str = "batch",
+    simulator: Literal["batch", "bullet"] = "batch",
     slots: int = 64,
     run_id: str = "",
     progress: Callable[[float], None] = lambda _: None,
@@ -233,16 +210,6 @@ def _episode(
         barn_score=barn_score(outcome, time=time, optimal_time=place.optimal_time_s),
         negative_velocity_count=negative_count,
     )
-
-
-def barn_score(outcome: EpisodeOutcome, *, time: float, optimal_time: float) -> float:
-    """Score an episode as the BARN challenge does: 0 for a failure, at most 1/2 for a success.
-
-    optimal time / clip(time, 2 x optimal time, 8 x optimal time)
-    """
-    if outcome != EpisodeOutcome.SUCCESS:
-        return 0.0
-    return optimal_time / min(max(time, BARN_FASTEST * optimal_time), BARN_SLOWEST * optimal_time)
 
 
 def _trial_seed(seed: int, place: EvaluationTask, number: int) -> int:

@@ -1,0 +1,72 @@
+"""Tests of the ONNX model against the policy it was written from."""
+
+import math
+
+import numpy as np
+import onnx
+import pytest
+from onnx.reference import ReferenceEvaluator
+
+from ses_core.learning.observation import (
+    AUTHORS_OBSERVATION,
+    DEFAULT_OBSERVATION,
+    ObservationSpec,
+    make_observer,
+)
+from ses_core.learning.onnx_export import export_onnx
+from ses_core.learning.policies import ParameterPolicy, random_policy
+from ses_core.planning.parameters import PARAMETER_HIGH, PARAMETER_LOW
+from ses_core.robot_profile import JACKAL, NEATO, RobotProfile
+from tests.ses_core.learning.snapshots import Snapshot
+
+COUNT = 20
+
+
+def lively_policy(spec: ObservationSpec) -> ParameterPolicy:
+    policy = random_policy(spec, (64, 32), rng=np.random.default_rng(3))
+    return ParameterPolicy(
+        observation=spec,
+        weights=(*policy.weights[:-1], policy.weights[-1] * 30),
+        biases=tuple(bias + np.float32(0.1) for bias in policy.biases),
+    )
+
+
+@pytest.mark.parametrize("spec", [AUTHORS_OBSERVATION, DEFAULT_OBSERVATION])
+@pytest.mark.parametrize("profile", [JACKAL, NEATO])
+def test_the_model_sets_the_parameters_that_the_policy_sets(
+    spec: ObservationSpec, profile: RobotProfile
+) -> None:
+    policy, observer = lively_policy(spec), make_observer(spec, profile)
+    rng = np.random.default_rng(4)
+    scans = rng.uniform(-0.5, 9.0, (COUNT, profile.laser.beams)).astype(np.float32)
+    scans[rng.random(scans.shape) < 0.1] = np.nan
+    scans[rng.random(scans.shape) < 0.1] = np.inf
+    angles = rng.uniform(-math.pi, math.pi, COUNT)
+    distances = rng.uniform(0.0, 15.0, COUNT)
+    in_force = rng.uniform(PARAMETER_LOW, PARAMETER_HIGH, (COUNT, 7))
+    state = Snapshot(
+        poses=np.zeros((COUNT, 3)),
+        goals=np.stack([distances, np.zeros(COUNT)], axis=1),
+        local_goals=np.stack([np.cos(angles), np.sin(angles)], axis=1),
+    )
+    inputs = {"scan": scans, "goal_angle": angles[:, None].astype(np.float32)}
+    if spec.goal_clip_m is not None:
+        inputs["goal_distance"] = distances[:, None].astype(np.float32)
+    if spec.has_parameters:
+        inputs["parameters"] = in_force.astype(np.float32)
+    model = onnx.load_model_from_string(export_onnx(policy, observer, profile))
+    [exported] = ReferenceEvaluator(model).run(None, inputs)
+    expected = policy.act(observer.observe(scans, state, in_force))
+    half = (PARAMETER_HIGH - PARAMETER_LOW) / 2.0
+    np.testing.assert_allclose(exported / half, expected / half, atol=1e-5)
+    assert (np.ptp(expected, axis=0) > 0.1 * half).all()
+
+
+def test_equal_policies_give_equal_models() -> None:
+    first = export_onnx(
+        lively_policy(DEFAULT_OBSERVATION), make_observer(DEFAULT_OBSERVATION, JACKAL), JACKAL
+    )
+    second = export_onnx(
+        lively_policy(DEFAULT_OBSERVATION), make_observer(DEFAULT_OBSERVATION, JACKAL), JACKAL
+    )
+    assert first == second
