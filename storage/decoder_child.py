@@ -1,0 +1,103 @@
+"""The limited process: reads one log, writes plain arrays, and can do nothing else.
+
+Run by `storage.log_decoder` as `python -m storage.decoder_child REQUEST.json` with an empty
+environment, in a folder and a session of its own. It never runs with `-O`: some of rosbags'
+guards are assertions.
+"""
+
+import ctypes
+import json
+import os
+import resource
+import signal
+import sys
+from pathlib import Path
+
+_PR_SET_PDEATHSIG = 1
+_PR_SET_NO_NEW_PRIVS = 38
+_OPEN_FILES = 64
+_MESSAGE_LIMIT = 500
+
+
+def main() -> int:
+    """Decode as the request says; the outcome is `outcome.json` beside it."""
+    request_path = Path(sys.argv[1])
+    request = json.loads(request_path.read_text(encoding="utf-8"))
+    _confine(request["limits"], parent=int(request["parent"]))
+    outcome = _decode(request)
+    (request_path.parent / "outcome.json").write_text(json.dumps(outcome), encoding="utf-8")
+    return 0
+
+
+def _confine(limits: dict[str, int], *, parent: int) -> None:
+    """Give up memory, time, files, privileges, and life after the parent's death."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+    if os.getppid() != parent:
+        os._exit(1)
+    for kind, value in (
+        (resource.RLIMIT_AS, limits["memory_mib"] * 2**20),
+        (resource.RLIMIT_CPU, limits["cpu_s"]),
+        (resource.RLIMIT_FSIZE, limits["output_mib"] * 2**20),
+        (resource.RLIMIT_NOFILE, _OPEN_FILES),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        _, hard = resource.getrlimit(kind)
+        allowed = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        resource.setrlimit(kind, (allowed, allowed))
+
+
+def _decode(request: dict[str, object]) -> dict[str, str]:
+    """Decode the log and say how it went: the reason is empty where it went well."""
+    # Imported under the limits, so that what they need counts too.
+    from ses_core.errors import LogError
+    from ses_core.robot_profile import RobotProfile
+    from ses_core.settings import DecoderLimits
+    from storage.log_formats import make_reader
+    from storage.recording_files import write_recording
+
+    limits = DecoderLimits.model_validate(request["limits"])
+    profile = RobotProfile.model_validate(request["profile"])
+    output = Path(str(request["output"]))
+    reader = make_reader(str(request["format"]), limits=limits, workdir=Path.cwd())
+    try:
+        recording = reader.read(
+            Path(str(request["log"])), profile=profile, pose_source=str(request["pose_source"])
+        )
+        write_recording(output, recording)
+    except LogError as error:
+        return {"reason": error.reason, "message": str(error)[:_MESSAGE_LIMIT]}
+    except (MemoryError, RecursionError, OSError) as error:
+        return {"reason": _resource_reason(error), "message": _describe(error)}
+    except Exception as error:  # noqa: BLE001 - 13 kinds of errors come out of damaged bags
+        return {"reason": _damage_reason(error), "message": _describe(error)}
+    return {"reason": "", "message": ""}
+
+
+def _resource_reason(error: BaseException) -> str:
+    if isinstance(error, MemoryError):
+        return "memory_limit"
+    return "unsupported" if isinstance(error, RecursionError) else "truncated"
+
+
+def _damage_reason(error: Exception) -> str:
+    """Give the reason for what rosbags and its libraries raise on files that are not whole."""
+    text = str(error).lower()
+    if "magic" in text and "end magic" not in text:
+        return "bad_magic"
+    if "checksum" in text:
+        return "checksum"
+    if type(error).__name__ == "NoMemError":
+        return "memory_limit"
+    if any(word in text for word in ("not supported", "unsupported", "profile")):
+        return "unsupported"
+    return "truncated"
+
+
+def _describe(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"[:_MESSAGE_LIMIT]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
