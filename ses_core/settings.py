@@ -70,6 +70,11 @@ class ExtractionSettings(SettingsModel):
     source: Literal["auto", "scan", "map"] = Field(
         "auto", description="Rebuild places from scans, a map, or a map where there is one."
     )
+    site_maps: dict[str, str] = Field(
+        default_factory=dict,
+        description="map_server YAML file of a site, by the site's name; used for logs whose "
+        "poses are in the frame of the map.",
+    )
     unknown: Literal["free", "occupied"] = Field(
         "free", description="What a cell that no beam reached counts as."
     )
@@ -124,8 +129,9 @@ class GanSettings(SettingsModel):
     adam_beta1: float = Field(0.5, ge=0, lt=1, description="First-moment decay of both optimisers.")
     leaky_slope: float = Field(0.2, gt=0, lt=1, description="Negative slope of the leaky ReLUs.")
     loss: Literal["saturating", "non-saturating"] = Field(
-        "saturating",
-        description="The generator minimises log(1 - D(G(z))) as printed, or -log D(G(z)).",
+        "non-saturating",
+        description="The generator minimises -log D(G(z)), or log(1 - D(G(z))) as printed, which "
+        "teaches it nothing once D is ahead.",
     )
     least_updates: int = Field(
         3000, ge=1, description="Updates made even where the epochs would make fewer."

@@ -3,7 +3,11 @@
 The paper gives the layers, the prior, the loss and the threshold. It leaves open, and
 `GanSettings` therefore holds: the length of the noise vector, epochs, batch size, learning
 rate, Adam's first decay, the slope of the leaky ReLUs. Fixed here: Adam's second decay 0.999,
-torch's own initial weights, real and generated batches normalized apart in D.
+torch's own initial weights, and that D normalizes real and generated halves as one batch.
+
+The last is no matter of taste: D's last hidden layer is normalized too, so the mean output
+over a normalized batch is the output bias. Halves normalized apart therefore have the same
+mean, whatever D learns, and G is taught nothing (measured: noise of 70 blobs, none crossable).
 """
 
 import math
@@ -119,7 +123,7 @@ def _train(
     settings: GanSettings,
     progress: Callable[[float], None],
 ) -> None:
-    """Alternate one update of D and one of G, each on a batch of its own noise."""
+    """Alternate one update of D and one of G on the same real and generated environments."""
     batch_size = min(settings.batch_size, len(real))
     per_epoch = len(real) // batch_size
     epochs = max(settings.epochs, math.ceil(settings.least_updates / per_epoch))
@@ -137,24 +141,30 @@ def _train(
             batch = real[order[number * batch_size : (number + 1) * batch_size]]
             fake = generator(torch.randn(batch_size, settings.latent_size))
 
-            loss_d = functional.softplus(-discriminator(batch)).mean()
-            loss_d = loss_d + functional.softplus(discriminator(fake.detach())).mean()
+            loss_d = discriminator_loss(discriminator(torch.cat((batch, fake.detach()))))
             optimiser_d.zero_grad(set_to_none=True)
             torch.autograd.backward(loss_d)
             optimiser_d.step()
 
-            loss_g = _generator_loss(discriminator(fake), settings)
+            loss_g = generator_loss(discriminator(torch.cat((batch, fake))), loss=settings.loss)
             optimiser_g.zero_grad(set_to_none=True)
             torch.autograd.backward(loss_g)
             optimiser_g.step()
         progress((epoch + 1) / epochs)
 
 
-def _generator_loss(logits: Tensor, settings: GanSettings) -> Tensor:
-    """Equation 1's log(1 - D(G(z))) of logits, or the non-saturating -log D(G(z))."""
-    if settings.loss == "saturating":
-        return -functional.softplus(logits).mean()
-    return functional.softplus(-logits).mean()
+def discriminator_loss(logits: Tensor) -> Tensor:
+    """Equation 1 for D, negated, of the logits (2 B, 1) of a real and a generated half."""
+    real, fake = logits.chunk(2)
+    return functional.softplus(-real).mean() + functional.softplus(fake).mean()
+
+
+def generator_loss(logits: Tensor, *, loss: str) -> Tensor:
+    """Equation 1's log(1 - D(G(z))) of the generated half, or the non-saturating -log D(G(z))."""
+    fake = logits.chunk(2)[1]
+    if loss == "saturating":
+        return -functional.softplus(fake).mean()
+    return functional.softplus(-fake).mean()
 
 
 @contextmanager

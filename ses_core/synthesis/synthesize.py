@@ -121,7 +121,7 @@ def draw_environments(
         method_asked=settings.synthesizer.method,
         method_used=method,
         drawn=drawn,
-        rejected_share=1.0 - crossable / drawn,
+        rejected_share=(drawn - crossable) / drawn,
         repeated=repeated,
         copies={
             environment.environment_id: recorded[environment.cells.tobytes()]
