@@ -1,0 +1,42 @@
+"""Drawn and random places to synthesize from."""
+
+import numpy as np
+
+from ses_core.arrays import BoolArray
+from ses_core.navigation import NavigationDomain, NavigationEnvironment
+
+
+def domain_of(cells: BoolArray) -> NavigationDomain:
+    """Make a domain of recorded places (N, 30, 30), each with a scenario of its own."""
+    return NavigationDomain(
+        tuple(
+            NavigationEnvironment(
+                environment_id=f"e{index}",
+                cells=place,
+                observed=np.ones_like(place),
+                origin="scan",
+                scenario_id=f"s{index}",
+            )
+            for index, place in enumerate(cells)
+        )
+    )
+
+
+def rooms(count: int, *, seed: int = 0) -> BoolArray:
+    """Draw rooms (count, 30, 30) with a wall across and a doorway of 5 cells (0.83 m) in it."""
+    rng = np.random.default_rng(seed)
+    cells = np.zeros((count, 30, 30), dtype=np.bool_)
+    for place in cells:
+        row, column = rng.integers(4, 26), rng.integers(0, 25)
+        place[row : row + 2] = True
+        place[row : row + 2, column : column + 5] = False
+    return cells
+
+
+def walled_off(count: int) -> BoolArray:
+    """Draw places (count, 30, 30) that no robot can cross, no two equal."""
+    cells = np.zeros((count, 30, 30), dtype=np.bool_)
+    for index, place in enumerate(cells):
+        place[5 + index // 30] = True
+        place[28, index % 30] = True
+    return cells
