@@ -1,0 +1,387 @@
+"""The local planner: base_local_planner's TrajectoryPlanner with `dwa: true`, in compiled code.
+
+Same as the original: velocity window, order of samples, costs and their scaling, preference for
+turning in place, oscillation flags, and the escape that is the stack's only negative velocity.
+
+Simplified, and why:
+- A sample moves at its velocity for the whole roll-out. The original lets it approach by the
+  acceleration limits, which inside a dynamic window takes one of its steps.
+- Roll-outs step 0.05 m of the farthest body point (the original 0.02 m or 0.02 rad) and test
+  points of the padded outline 0.165 m apart (the original each cell on it); coarser lets
+  contacts happen that the stack avoids, finer changes nothing.
+- Samples are tried in the order of their cost at the end point, and given up once their cost is
+  known to exceed the best. That decides how soon the best is found, not which one it is.
+"""
+
+import math
+
+import numpy as np
+
+from ses_core.arrays import ByteArray, Float32Array, FloatArray
+from ses_core.compilation import compiled
+from ses_core.planning.costmap import LETHAL, RESOLUTION_M, WINDOW_SIZE, window_place
+from ses_core.planning.distance_maps import IMPOSSIBLE
+from ses_core.simulation.robot import RobotModel, drive, wrap
+from ses_core.simulation.state import Memory, Scratch, Slot, UInt16Array
+
+MIN_VEL_X = 0.1
+MIN_IN_PLACE_VEL_THETA = 0.314
+ESCAPE_VEL = -0.5
+SIM_TIME_S = 2.0
+OCCDIST_SCALE = 0.1
+HEADING_LOOKAHEAD_M = 0.325
+OSCILLATION_RESET_M = 0.05
+ESCAPE_RESET_M = 0.1
+ESCAPE_RESET_RAD = 0.1
+"""jackal_navigation's base_local_planner_params.yaml. `occdist_scale` multiplies raw costs, while
+the two biases are multiplied by the cell size (meter_scoring)."""
+
+ROLLOUT_STEP_M = 0.05
+
+MAX_VX_SAMPLES = 24
+MAX_VTHETA_SAMPLES = 64
+
+HITS = -1.0
+NO_WAY = -2.0
+"""Costs of a roll-out whose outline meets a lethal cell; that enters a cell no way leads from."""
+
+_MAX_VEL_X, _MAX_VEL_THETA, _VX_SAMPLES, _VTHETA_SAMPLES, _PATH_BIAS, _GOAL_BIAS = range(6)
+
+
+@compiled
+def velocity_window(
+    velocity: float, lowest: float, highest: float, acceleration: float, period: float
+) -> tuple[float, float]:
+    """Give what is reachable within one control period, inside the limits."""
+    return (
+        max(lowest, velocity - acceleration * period),
+        max(min(highest, velocity + acceleration * period), lowest),
+    )
+
+
+@compiled
+def find_command(
+    slot: Slot,
+    memory: Memory,
+    number: int,
+    robot: RobotModel,
+    parameters: FloatArray,
+    period: float,
+    scratch: Scratch,
+    worker: int,
+) -> bool:
+    """Set the slot's command to the best sample's velocities.
+
+    Args:
+        parameters: (7,) of this slot, in the order of `PARAMETER_NAMES`.
+        period: Control period [s].
+
+    Returns:
+        Whether there is a valid command; without one the robot stops.
+    """
+    vx_count = min(max(int(parameters[_VX_SAMPLES] + 0.5), 2), MAX_VX_SAMPLES)
+    vtheta_count = min(max(int(parameters[_VTHETA_SAMPLES] + 0.5), 2), MAX_VTHETA_SAMPLES)
+    last = slot.plan_size - 1
+    end_x, end_y = window_place(slot, slot.x, slot.y)
+    away_x = slot.map_x + memory.plans[number, last, 0] * RESOLUTION_M - slot.x
+    away_y = slot.map_y + memory.plans[number, last, 1] * RESOLUTION_M - slot.y
+    highest = min(parameters[_MAX_VEL_X], math.hypot(away_x, away_y) / SIM_TIME_S)
+    v_low, v_high = velocity_window(slot.v, MIN_VEL_X, highest, robot.acceleration, period)
+    turn = parameters[_MAX_VEL_THETA]
+    w_low, w_high = velocity_window(slot.w, -turn, turn, robot.turn_acceleration, period)
+    w_step = (w_high - w_low) / (vtheta_count - 1)
+    best_cost, best_v, best_w = -1.0, 0.0, 0.0
+    if not slot.is_escaping:
+        sample, best_cost = _best_forward(
+            slot,
+            memory,
+            number,
+            robot,
+            parameters,
+            scratch.samples[worker],
+            v_low,
+            v_high,
+            vx_count,
+            w_low,
+            w_step,
+            vtheta_count,
+        )
+        if sample >= 0:
+            best_v = v_low + (sample // vtheta_count) * (v_high - v_low) / (vx_count - 1)
+            best_w = _forward_turn(sample % vtheta_count, w_low, w_step)
+    best_cost, best_v, best_w = _prefer_turning(
+        slot,
+        memory,
+        number,
+        robot,
+        parameters,
+        w_low,
+        w_step,
+        vtheta_count,
+        best_cost,
+        best_v,
+        best_w,
+    )
+    if best_cost >= 0.0:
+        _note_oscillation(slot, best_v, best_w)
+        _end_escape(slot)
+        slot.command_v, slot.command_w = best_v, best_w
+        return True
+    return _escape(slot, memory, number, robot)
+
+
+@compiled
+def _forward_turn(place: int, w_low: float, w_step: float) -> float:
+    """Give the turn rate of a forward sample: straight first, then from the window's low end."""
+    return 0.0 if place == 0 else w_low + (place - 1) * w_step
+
+
+@compiled
+def _best_forward(
+    slot: Slot,
+    memory: Memory,
+    number: int,
+    robot: RobotModel,
+    parameters: FloatArray,
+    samples: FloatArray,
+    v_low: float,
+    v_high: float,
+    vx_count: int,
+    w_low: float,
+    w_step: float,
+    vtheta_count: int,
+) -> tuple[int, float]:
+    """Find the cheapest legal forward sample, the first of equals; (-1, -1) if none is legal."""
+    x, y = window_place(slot, slot.x, slot.y)
+    path, goal = memory.path_steps[number], memory.goal_steps[number]
+    v_step = (v_high - v_low) / (vx_count - 1)
+    count = vx_count * vtheta_count
+    for place in range(vtheta_count):
+        w = _forward_turn(place, w_low, w_step)
+        unit_x, unit_y, _ = drive(0.0, 0.0, slot.yaw, 1.0 / RESOLUTION_M, w, SIM_TIME_S)
+        for level in range(vx_count):
+            v = v_low + level * v_step
+            samples[level * vtheta_count + place] = _end_cost(
+                path, goal, x + v * unit_x, y + v * unit_y, parameters
+            )
+    best, best_cost = -1, -1.0
+    while True:
+        sample = 0
+        for other in range(1, count):
+            if samples[other] < samples[sample]:
+                sample = other
+        end_cost = samples[sample]
+        if end_cost == math.inf or (best >= 0 and end_cost > best_cost):
+            return best, best_cost
+        samples[sample] = math.inf
+        v = v_low + (sample // vtheta_count) * v_step
+        w = _forward_turn(sample % vtheta_count, w_low, w_step)
+        allowed = math.inf if best < 0 else (best_cost - end_cost) / OCCDIST_SCALE
+        cost = rollout_cost(slot, memory, number, robot, v, w, True, allowed)
+        if cost < 0.0:
+            continue
+        cost = end_cost + OCCDIST_SCALE * cost
+        if best < 0 or cost < best_cost or (cost == best_cost and sample < best):
+            best, best_cost = sample, cost
+
+
+@compiled
+def _end_cost(
+    path: UInt16Array, goal: UInt16Array, x: float, y: float, parameters: FloatArray
+) -> float:
+    """Give what a roll-out ending at (x, y) [cells] costs by path and goal; inf where it must not."""
+    if not (1.0 <= x < WINDOW_SIZE - 1.0 and 1.0 <= y < WINDOW_SIZE - 1.0):
+        return math.inf
+    column, row = int(x), int(y)
+    to_path, to_goal = int(path[row, column]), int(goal[row, column])
+    if to_path >= IMPOSSIBLE or to_goal >= IMPOSSIBLE:
+        return math.inf
+    return RESOLUTION_M * (parameters[_PATH_BIAS] * to_path + parameters[_GOAL_BIAS] * to_goal)
+
+
+@compiled
+def rollout_cost(
+    slot: Slot,
+    memory: Memory,
+    number: int,
+    robot: RobotModel,
+    v: float,
+    w: float,
+    is_backwards: bool,
+    allowed: float,
+) -> float:
+    """Give the highest cost under the outline and the centre over a roll-out of 2 s.
+
+    Args:
+        is_backwards: From its end to its start: the same cost, and a collision is met sooner.
+            In the order of driving, the first reason decides between HITS and NO_WAY.
+        allowed: Stop once the cost exceeds this.
+
+    Returns:
+        A cost in [0, 253], HITS or NO_WAY.
+    """
+    distances, costs = memory.window_distances[number], memory.costs[number]
+    path, goal = memory.path_steps[number], memory.goal_steps[number]
+    centre_x, centre_y = window_place(slot, slot.x, slot.y)
+    farthest = max(abs(v), abs(w) * robot.circumscribed_radius) * SIM_TIME_S
+    steps = max(1, int(math.ceil(farthest / ROLLOUT_STEP_M)))
+    first_cosine, first_sine = math.cos(slot.yaw), math.sin(slot.yaw)
+    turned = w * SIM_TIME_S / steps
+    cosine, sine = first_cosine, first_sine
+    if is_backwards:
+        cosine = math.cos(slot.yaw + w * SIM_TIME_S)
+        sine = math.sin(slot.yaw + w * SIM_TIME_S)
+        turned = -turned
+    turn_cosine, turn_sine = math.cos(turned), math.sin(turned)
+    is_straight = abs(w) < 1e-6
+    radius = 0.0 if is_straight else v / w / RESOLUTION_M
+    stride = v * SIM_TIME_S / steps / RESOLUTION_M
+    worst = 0.0
+    for k in range(steps + 1):
+        step = steps - k if is_backwards else k
+        if is_straight:
+            x, y = centre_x + step * stride * cosine, centre_y + step * stride * sine
+        else:
+            x = centre_x + radius * (sine - first_sine)
+            y = centre_y - radius * (cosine - first_cosine)
+        cost = _pose_cost(distances, costs, robot, x, y, cosine, sine)
+        if cost < 0.0:
+            return HITS
+        if path[int(y), int(x)] >= IMPOSSIBLE or goal[int(y), int(x)] >= IMPOSSIBLE:
+            return NO_WAY
+        worst = max(worst, cost)
+        if worst > allowed:
+            return worst
+        cosine, sine = (
+            cosine * turn_cosine - sine * turn_sine,
+            sine * turn_cosine + cosine * turn_sine,
+        )
+    return worst
+
+
+@compiled
+def _pose_cost(
+    distances: ByteArray,
+    costs: Float32Array,
+    robot: RobotModel,
+    x: float,
+    y: float,
+    cosine: float,
+    sine: float,
+) -> float:
+    """Give the highest cost under the outline and the centre at a pose [cells], or HITS."""
+    if not (1.0 <= x < WINDOW_SIZE - 1.0 and 1.0 <= y < WINDOW_SIZE - 1.0):
+        return HITS
+    centre = int(distances[int(y), int(x)])
+    # Outline cells are at most this much nearer to an obstacle than the centre's cell.
+    slack = robot.circumscribed_radius / RESOLUTION_M + math.sqrt(2.0)
+    nearest = max(0.0, math.sqrt(float(centre)) - slack)
+    if costs[int(nearest * nearest)] == 0.0:
+        return 0.0
+    least = centre
+    cosine, sine = cosine / RESOLUTION_M, sine / RESOLUTION_M
+    for k in range(robot.outline.shape[0]):
+        point_x = x + cosine * robot.outline[k, 0] - sine * robot.outline[k, 1]
+        point_y = y + sine * robot.outline[k, 0] + cosine * robot.outline[k, 1]
+        if not (0.0 <= point_x < WINDOW_SIZE and 0.0 <= point_y < WINDOW_SIZE):
+            return HITS
+        squared = int(distances[int(point_y), int(point_x)])
+        if squared == 0:
+            return HITS
+        least = min(least, squared)
+    return float(costs[least])
+
+
+@compiled
+def _prefer_turning(
+    slot: Slot,
+    memory: Memory,
+    number: int,
+    robot: RobotModel,
+    parameters: FloatArray,
+    w_low: float,
+    w_step: float,
+    vtheta_count: int,
+    best_cost: float,
+    best_v: float,
+    best_w: float,
+) -> tuple[float, float, float]:
+    """Turn in place instead, if that costs no more, towards where the goal is nearest ahead."""
+    x, y = window_place(slot, slot.x, slot.y)
+    path, goal = memory.path_steps[number], memory.goal_steps[number]
+    end_cost = _end_cost(path, goal, x, y, parameters)
+    if end_cost == math.inf:
+        return best_cost, best_v, best_w
+    least_ahead = math.inf
+    for k in range(vtheta_count):
+        sampled = w_low + k * w_step
+        if abs(sampled) <= w_step or (slot.is_stuck_left if sampled < 0.0 else slot.is_stuck_right):
+            continue
+        w = (
+            max(sampled, MIN_IN_PLACE_VEL_THETA)
+            if sampled > 0.0
+            else min(sampled, -MIN_IN_PLACE_VEL_THETA)
+        )
+        yaw = slot.yaw + w * SIM_TIME_S
+        ahead_x = x + HEADING_LOOKAHEAD_M / RESOLUTION_M * math.cos(yaw)
+        ahead_y = y + HEADING_LOOKAHEAD_M / RESOLUTION_M * math.sin(yaw)
+        ahead = float(goal[int(ahead_y), int(ahead_x)])
+        if ahead >= least_ahead:
+            continue
+        cost = rollout_cost(slot, memory, number, robot, 0.0, w, True, math.inf)
+        if cost < 0.0:
+            continue
+        cost = end_cost + OCCDIST_SCALE * cost
+        if best_cost < 0.0 or cost <= best_cost:
+            best_cost, best_v, best_w, least_ahead = cost, 0.0, w, ahead
+    return best_cost, best_v, best_w
+
+
+@compiled
+def _note_oscillation(slot: Slot, v: float, w: float) -> None:
+    """Bar turning back after turning twice one way, until the robot has moved 0.05 m.
+
+    The names are the original's: after two turns to the right `stuck_right` bars turns to the
+    left.
+    """
+    if v <= 0.0:
+        if w < 0.0:
+            slot.is_stuck_right = slot.is_stuck_right or slot.is_rotating_right
+            slot.is_rotating_right = True
+        elif w > 0.0:
+            slot.is_stuck_left = slot.is_stuck_left or slot.is_rotating_left
+            slot.is_rotating_left = True
+        slot.oscillation_x, slot.oscillation_y = slot.x, slot.y
+    _reset_oscillation(slot)
+
+
+@compiled
+def _reset_oscillation(slot: Slot) -> None:
+    moved = math.hypot(slot.x - slot.oscillation_x, slot.y - slot.oscillation_y)
+    if moved > OSCILLATION_RESET_M:
+        slot.is_rotating_left, slot.is_rotating_right = False, False
+        slot.is_stuck_left, slot.is_stuck_right = False, False
+
+
+@compiled
+def _end_escape(slot: Slot) -> None:
+    """Allow forward samples again once the robot got away."""
+    moved = math.hypot(slot.x - slot.escape_x, slot.y - slot.escape_y)
+    if moved > ESCAPE_RESET_M or abs(wrap(slot.yaw - slot.escape_yaw)) > ESCAPE_RESET_RAD:
+        slot.is_escaping = False
+
+
+@compiled
+def _escape(slot: Slot, memory: Memory, number: int, robot: RobotModel) -> bool:
+    """Back up, even where the map shows an obstacle; not where no way leads from."""
+    cost = rollout_cost(slot, memory, number, robot, ESCAPE_VEL, 0.0, False, math.inf)
+    _reset_oscillation(slot)
+    if not slot.is_escaping and cost > NO_WAY:
+        slot.escape_x, slot.escape_y, slot.escape_yaw = slot.x, slot.y, slot.yaw
+        slot.is_escaping = True
+    _end_escape(slot)
+    if cost == NO_WAY:
+        slot.command_v, slot.command_w = 0.0, 0.0
+        return False
+    slot.command_v, slot.command_w = ESCAPE_VEL, 0.0
+    return True
