@@ -116,6 +116,9 @@ class FilterSettings(SettingsModel):
     min_observed_fraction: float = Field(
         0.25, ge=0, le=1, description="Least share of cells seen; a corridor shows about 0.4."
     )
+    max_contradicted_fraction: float = Field(
+        0.5, ge=0, le=1, description="Most beam ends that other beams saw through (lost poses)."
+    )
 
 
 class GanSettings(SettingsModel):

@@ -121,6 +121,7 @@ def _environment_columns(
         "observed_fraction": [quality.observed_fraction for _, quality in places],
         "path_in_free_fraction": [quality.path_in_free_fraction for _, quality in places],
         "overridden_cells": [quality.overridden_cells for _, quality in places],
+        "contradicted_fraction": [quality.contradicted_fraction for _, quality in places],
         "is_traversable": [quality.is_traversable for _, quality in places],
         "closest_obstacle_m": [one.closest_obstacle if one else None for one in measures],
         "visibility_m": [one.visibility if one else None for one in measures],

@@ -174,6 +174,8 @@ _NULLABLE: Final[dict[str, dict[str, pa.DataType]]] = {
         "tortuosity": _REAL,
         # Cells that counted as occupied although the robot drove there.
         "overridden_cells": _WHOLE,
+        # Share of beam ends in cells that most beams looked through; null from a map.
+        "contradicted_fraction": _REAL,
         # The night that synthesized it.
         "run_id": _TEXT,
     },

@@ -29,6 +29,7 @@ class PlaceQuality:
         path_in_free_fraction: Share of the robot's own path that lies in free cells, before
             the path corrected any.
         overridden_cells: Occupied cells freed because the robot drove there.
+        contradicted_fraction: Share of beam ends that most beams looked through; None from a map.
         is_traversable: The target robot's disc gets from start to goal.
         difficulty: BARN's measures for the target; None where it cannot cross.
     """
@@ -36,6 +37,7 @@ class PlaceQuality:
     observed_fraction: float
     path_in_free_fraction: float
     overridden_cells: int
+    contradicted_fraction: float | None
     is_traversable: bool
     difficulty: DifficultyMeasures | None
 
@@ -118,6 +120,7 @@ def _quality(place: Reconstruction, target: RobotProfile) -> PlaceQuality:
         observed_fraction=float(place.observed.mean()),
         path_in_free_fraction=place.path_in_free_fraction,
         overridden_cells=place.overridden_cells,
+        contradicted_fraction=place.contradicted_fraction,
         is_traversable=bool(traversable(place.cells[None], radius=radius)[0]),
         difficulty=measure_difficulty(place.cells, radius=radius),
     )

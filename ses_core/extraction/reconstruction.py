@@ -13,7 +13,7 @@ import numpy as np
 from scipy import ndimage
 
 from ses_core.arrays import BoolArray, ByteArray, FloatArray
-from ses_core.extraction.ray_tracing import trace_scans
+from ses_core.extraction.ray_tracing import Evidence, trace_scans
 from ses_core.extraction.recording import RecordedMap, ScanStream
 from ses_core.extraction.scenario import Scenario
 from ses_core.extraction.trajectory import Trajectory
@@ -63,6 +63,9 @@ class Reconstruction:
         path_in_free_fraction: Share of the driven path that lies in free cells of the course,
             before the path corrected any; what leaves the window sideways is not free.
         overridden_cells: Occupied cells that were freed because the robot itself drove there.
+        contradicted_fraction: Share of the beam ends in the window that lie in cells which most
+            beams looked through. Some are people; where most are, the poses were wrong and
+            the place is smeared until nothing is left. None from a map.
     """
 
     cells: BoolArray
@@ -70,6 +73,7 @@ class Reconstruction:
     origin: Literal["scan", "map"]
     path_in_free_fraction: float
     overridden_cells: int
+    contradicted_fraction: float | None
 
 
 def scenario_frame(scenario: Scenario) -> Pose2D:
@@ -96,12 +100,17 @@ def reconstruct(
         body_radius: Radius [m] of the disc inside the body of the robot that drove.
     """
     frame = scenario_frame(scenario)
+    origin: Literal["scan", "map"] = "map"
+    contradicted: float | None = None
     if recorded_map is not None and settings.source != "scan":
-        origin: Literal["scan", "map"] = "map"
         fine = _from_map(recorded_map, frame)
     elif settings.source != "map":
         origin = "scan"
-        fine = _from_scans(trajectory, scenario, frame, settings)
+        evidence = _scan_evidence(trajectory, scenario, frame, settings)
+        if evidence is None:
+            return None
+        fine = _weigh(evidence, settings)
+        contradicted = _contradicted_fraction(evidence, settings)
     else:
         return None
     if (fine == UNKNOWN).all():
@@ -116,6 +125,7 @@ def reconstruct(
         origin=origin,
         path_in_free_fraction=float((~occupied_at(environment_course(as_seen), path)).mean()),
         overridden_cells=int((as_seen & ~cells).sum()),
+        contradicted_fraction=contradicted,
     )
 
 
@@ -150,15 +160,14 @@ def sensor_poses(scans: ScanStream, body_poses: FloatArray, frame: Pose2D) -> Fl
     return np.column_stack((to_frame(poses[:, :2], frame), wrap_angles(poses[:, 2] - frame.yaw)))
 
 
-def _from_scans(
+def _scan_evidence(
     trajectory: Trajectory, scenario: Scenario, frame: Pose2D, settings: ExtractionSettings
-) -> ByteArray:
-    """Fill the fine grid [iy, ix] with what the scans show."""
-    fine = np.full((FINE_CELLS, FINE_CELLS), UNKNOWN, dtype=np.uint8)
+) -> Evidence | None:
+    """Trace the scans of a scenario through the fine grid; None where there are none."""
     chosen = scans_of(trajectory, scenario, margin=settings.scan_margin_s)
     if trajectory.scans is None or trajectory.scan_poses is None or chosen.start == chosen.stop:
-        return fine
-    evidence = trace_scans(
+        return None
+    return trace_scans(
         trajectory.scans.ranges[chosen],
         trajectory.scans.angles,
         sensor_poses(trajectory.scans, trajectory.scan_poses[chosen], frame),
@@ -167,11 +176,21 @@ def _from_scans(
         resolution=FINE_RESOLUTION_M,
         size=FINE_CELLS,
     )
+
+
+def _weigh(evidence: Evidence, settings: ExtractionSettings) -> ByteArray:
+    """Decide every fine cell [iy, ix] from its hits and passes."""
     seen = evidence.hits + evidence.passes
-    fine[seen > 0] = FREE
+    fine = np.where(seen > 0, np.uint8(FREE), np.uint8(UNKNOWN))
     is_hit = (evidence.hits >= settings.hit_minimum) & (evidence.hits >= settings.hit_share * seen)
     fine[is_hit] = OCCUPIED
     return fine
+
+
+def _contradicted_fraction(evidence: Evidence, settings: ExtractionSettings) -> float:
+    seen = evidence.hits + evidence.passes
+    contradicted = evidence.hits[evidence.hits < settings.hit_share * seen].sum()
+    return float(contradicted / max(1, evidence.hits.sum()))
 
 
 def _from_map(recorded_map: RecordedMap, frame: Pose2D) -> ByteArray:

@@ -53,8 +53,8 @@ class FilterFunnel:
         scenarios: Scenarios in the window.
         unknown: Of these, with an unknown count: never challenging.
         challenging: Of these, with a count above the threshold or within the share.
-        rejected: Of the challenging, by reason: `no_environment`, `not_traversable`,
-            `path_not_free` or `hardly_observed`; the first that applies.
+        rejected: Of the challenging, by reason: `no_environment`, `scans_disagree`,
+            `hardly_observed`, `path_not_free` or `not_traversable`; the first that applies.
         usable: The challenging that were not rejected.
         heldout: Of the usable, in places held out for evaluation.
         straddling: Of the usable, between a held-out place and another; used for neither.
@@ -196,20 +196,29 @@ def _rejections(
     rows: pd.DataFrame, environments: pd.DataFrame, settings: FilterSettings
 ) -> pd.Series:
     """Say why the place of each row cannot be used; empty where it can."""
-    columns = ["environment_id", "is_traversable", "path_in_free_fraction", "observed_fraction"]
-    places = environments.loc[environments["scenario_id"] != "", columns]
+    places = environments[environments["scenario_id"] != ""]
     places = places.drop_duplicates("environment_id").set_index("environment_id")
     found = places.reindex(rows["environment_id"])
-    path_in_free = found["path_in_free_fraction"].to_numpy(dtype=np.float64, na_value=np.nan)
-    observed = found["observed_fraction"].to_numpy(dtype=np.float64, na_value=np.nan)
+    contradicted, observed, path_in_free = (
+        found[column].to_numpy(dtype=np.float64, na_value=np.nan)
+        for column in ("contradicted_fraction", "observed_fraction", "path_in_free_fraction")
+    )
     reasons = np.select(
         [
             ~rows["environment_id"].isin(places.index).to_numpy(dtype=np.bool_),
-            ~found["is_traversable"].isin([True]).to_numpy(dtype=np.bool_),
-            ~(path_in_free >= settings.min_path_in_free_fraction),
+            # Unknown for places from a map, where there is nothing to contradict.
+            contradicted > settings.max_contradicted_fraction,
             ~(observed >= settings.min_observed_fraction),
+            ~(path_in_free >= settings.min_path_in_free_fraction),
+            ~found["is_traversable"].isin([True]).to_numpy(dtype=np.bool_),
         ],
-        ["no_environment", "not_traversable", "path_not_free", "hardly_observed"],
+        [
+            "no_environment",
+            "scans_disagree",
+            "hardly_observed",
+            "path_not_free",
+            "not_traversable",
+        ],
         default="",
     )
     return pd.Series(reasons, index=rows.index, dtype=object)

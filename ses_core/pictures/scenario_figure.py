@@ -248,6 +248,8 @@ def quality_rows(quality: PlaceQuality | None) -> list[tuple[str, str]]:
         ("cells corrected", str(quality.overridden_cells)),
         ("can be crossed", "yes" if quality.is_traversable else "no"),
     ]
+    if quality.contradicted_fraction is not None:
+        rows.insert(2, ("scans disagree", f"{quality.contradicted_fraction:.0%}"))
     if quality.difficulty is not None:
         measures = quality.difficulty
         rows += [
