@@ -58,11 +58,16 @@ def profile_of(identity: Identity, name: str, settings: IngestSettings) -> Robot
     path = f"{identity.site}/{identity.robot}/{name}"
     for rule in settings.robots:
         if fnmatchcase(path, rule.match):
-            return _profile(rule.profile, settings)
-    return _profile(settings.default_profile, settings)
+            return profile_named(rule.profile, settings)
+    return profile_named(settings.default_profile, settings)
 
 
-def _profile(name: str, settings: IngestSettings) -> RobotProfile:
+def profile_named(name: str, settings: IngestSettings) -> RobotProfile:
+    """Give a profile by its name: one of the settings, or a built-in one.
+
+    Raises:
+        SettingsError: There is none.
+    """
     profiles = {**KNOWN_PROFILES, **settings.profiles}
     if name not in profiles:
         raise SettingsError(f"robot profile {name!r} is not one of {', '.join(sorted(profiles))}")

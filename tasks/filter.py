@@ -1,0 +1,49 @@
+"""Filter: which scenarios of the last days are challenging, and which places are held out."""
+
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+
+from prefect import task
+from prefect.cache_policies import NO_CACHE
+
+from ses_core.extraction.selection import select_challenging
+from ses_core.recipes import ArtifactRef, Recipe, settings_json
+from ses_core.settings import FilterSettings
+from storage.artifact_store import LocalArtifactStore
+from storage.materialize import Materialized, materialize
+from storage.selection_files import write_selection
+from storage.stages import FILTER
+from storage.table_reader import open_table
+from tasks.outcome import conclude
+
+
+@task(name="select challenging scenarios", cache_policy=NO_CACHE)
+def select_scenarios(
+    extracted: Sequence[ArtifactRef],
+    *,
+    last_batch: date,
+    store: LocalArtifactStore,
+    settings: FilterSettings,
+) -> Materialized:
+    """Choose the pool that is synthesized from and the places that are held out."""
+    recipe = Recipe(
+        FILTER,
+        {"filter": settings_json(settings), "last_batch": last_batch.isoformat()},
+        input_set=frozenset(extracted),
+    )
+
+    def build(directory: Path) -> None:
+        root = store.layout.root
+        logs = open_table(root, "logs", columns=["log_id", "pose_source"])
+        environments = open_table(root, "environments")
+        selection = select_challenging(
+            open_table(root, "scenarios"),
+            environments,
+            settings=settings,
+            last_batch=last_batch,
+            map_logs=frozenset(logs.loc[logs["pose_source"] == "map", "log_id"]),
+        )
+        write_selection(directory, selection, environments)
+
+    return conclude(materialize(store, recipe, build))

@@ -1,0 +1,96 @@
+"""Synthesize: from the pool of challenging environments to the ones that are trained in."""
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from prefect import task
+from prefect.cache_policies import NO_CACHE
+
+from ses_core.recipes import ArtifactRef, Recipe, settings_json
+from ses_core.robot_profile import RobotProfile
+from ses_core.settings import SynthesisSettings
+from ses_core.synthesis.synthesize import draw_environments, fit_synthesis
+from storage.artifact_store import LocalArtifactStore
+from storage.environment_files import write_environments
+from storage.materialize import Materialized, materialize
+from storage.night_contents import SYNTHESIS_FILE
+from storage.night_report import SynthesisUse
+from storage.selection_files import domain_digest, read_selection
+from storage.stage_records import write_record
+from storage.stages import FIT, SYNTHESIZE
+from storage.synthesizer_files import read_synthesizer, write_synthesizer
+from tasks.outcome import conclude
+from tasks.progress import report_progress
+
+
+@task(name="fit the synthesizer", cache_policy=NO_CACHE)
+def fit_synthesizer(
+    selection: ArtifactRef, *, store: LocalArtifactStore, settings: SynthesisSettings
+) -> Materialized:
+    """Learn what the challenging environments look like; anew only when their set changed."""
+    pool = read_selection(store.path(selection)).pool_environments
+    recipe = Recipe(
+        FIT,
+        {
+            "pool": domain_digest(pool),
+            "synthesizer": settings_json(settings.synthesizer),
+            "environments": settings.environments,
+            "seed": settings.seed,
+        },
+    )
+
+    def build(directory: Path) -> None:
+        rng = np.random.default_rng([settings.seed, 0])
+        progress = report_progress("synthesize")
+        write_synthesizer(
+            directory, fit_synthesis(pool, settings=settings, rng=rng, progress=progress)
+        )
+
+    return conclude(materialize(store, recipe, build))
+
+
+@task(name="sample environments", cache_policy=NO_CACHE)
+def sample_environments(
+    fit: ArtifactRef,
+    selection: ArtifactRef,
+    *,
+    store: LocalArtifactStore,
+    settings: SynthesisSettings,
+    target: RobotProfile,
+) -> Materialized:
+    """Draw environments until enough of them can be crossed by the target robot."""
+    pool = read_selection(store.path(selection)).pool_environments
+    recipe = Recipe(
+        SYNTHESIZE,
+        {
+            "pool": domain_digest(pool),
+            "environments": settings.environments,
+            "attempts": settings.attempts,
+            "seed": settings.seed,
+            "inscribed_radius_m": target.inscribed_radius_m,
+        },
+        inputs=(fit,),
+    )
+
+    def build(directory: Path) -> None:
+        result = draw_environments(
+            read_synthesizer(store.path(fit)),
+            pool,
+            settings=settings,
+            target=target,
+            rng=np.random.default_rng([settings.seed, 1]),
+        )
+        write_environments(directory, result.environments, target=target)
+        used = SynthesisUse(
+            method_asked=result.method_asked,
+            method_used=result.method_used,
+            drawn=result.drawn,
+            rejected_share=result.rejected_share,
+            repeated=result.repeated,
+            copied=len(result.copies),
+            notes=result.notes,
+        )
+        write_record(directory / SYNTHESIS_FILE, asdict(used))
+
+    return conclude(materialize(store, recipe, build))

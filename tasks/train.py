@@ -1,0 +1,139 @@
+"""Train: fine-tune the parameter policy from the deployed one in the synthesized environments."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from prefect import task
+from prefect.cache_policies import NO_CACHE
+
+from ses_core.learning.policy_bundle import Lineage
+from ses_core.navigation import NavigationTask, environment_task
+from ses_core.recipes import ArtifactRef, JsonValue, Recipe, settings_json
+from ses_core.settings import Settings
+from storage.artifact_store import LocalArtifactStore
+from storage.environment_files import read_environments
+from storage.materialize import Materialized, materialize
+from storage.policy_files import NamedPolicy, find_policy, write_curve, write_policy
+from storage.stage_records import write_record
+from storage.stages import TRAIN
+from storage.training_record import TRAINING_FILE, TrainingRecord
+from tasks.outcome import conclude
+from tasks.progress import report_progress
+
+
+def stop_at(deadline_stamp_s: float | None) -> Callable[[], bool]:
+    """Give the question a training asks after every second of driving: is it time to stop?"""
+    return lambda: deadline_stamp_s is not None and time.time() >= deadline_stamp_s
+
+
+@task(name="train the policy", cache_policy=NO_CACHE)
+def train_policy(
+    environments: ArtifactRef,
+    *,
+    parent: str,
+    run_id: str,
+    store: LocalArtifactStore,
+    settings: Settings,
+    deadline_stamp_s: float | None = None,
+) -> Materialized:
+    """Go on from the parent in the synthesized environments, and bundle what was learned.
+
+    Args:
+        environments: What episodes are drawn from.
+        parent: Name of the policy to go on from.
+        run_id: The night that asks.
+        store: Where the bundle goes.
+        settings: Training, simulation and target robot.
+        deadline_stamp_s: Unix time at which training stops where it is [s].
+    """
+    source = find_policy(parent, store.layout)
+    asked: dict[str, JsonValue] = {
+        "training": settings_json(settings.training),
+        "simulation": settings_json(settings.simulation),
+        "target_robot": settings_json(settings.target_robot),
+        "parent": source.policy_id,
+        "has_deadline": deadline_stamp_s is not None,
+    }
+
+    def build(directory: Path) -> None:
+        domain = read_environments(store.path(environments))
+        tasks = [environment_task(environment) for environment in domain.environments]
+        made_by = sorted({environment.origin for environment in domain.environments})
+        save_training(
+            directory,
+            tasks,
+            parent=source,
+            run_id=run_id,
+            trained_in=f"environments of 5 m synthesized by {', '.join(made_by)}",
+            settings=settings,
+            deadline=stop_at(deadline_stamp_s),
+        )
+
+    return conclude(materialize(store, Recipe(TRAIN, asked, inputs=(environments,)), build))
+
+
+def save_training(
+    directory: Path,
+    tasks: Sequence[NavigationTask],
+    *,
+    parent: NamedPolicy | None,
+    run_id: str,
+    trained_in: str,
+    settings: Settings,
+    deadline: Callable[[], bool] = lambda: False,
+) -> TrainingRecord:
+    """Train and write bundle, learning curve and record into a folder.
+
+    Args:
+        directory: Where to; it is made if it is missing.
+        tasks: What episodes are drawn from.
+        parent: The policy to go on from; None for random weights.
+        run_id: The run that asks, for the lineage.
+        trained_in: What the tasks are, in words, for the card.
+        settings: Training, simulation and target robot.
+        deadline: Asked after every second of driving whether to stop.
+    """
+    # torch and stable-baselines3 take seconds to import: only a training pays for them.
+    from ses_core.learning.training import train
+
+    bundle = parent.bundle if parent else None
+    result = train(
+        tasks,
+        parent=bundle.policy if bundle else None,
+        settings=settings.training,
+        simulation=settings.simulation,
+        profile=settings.target_robot,
+        progress=report_progress("train"),
+        deadline=deadline,
+    )
+    record = TrainingRecord(
+        algorithm=settings.training.algorithm,
+        steps=result.steps,
+        seed=settings.training.seed,
+        environments=len(tasks),
+        seconds=round(result.seconds, 1),
+        ended=result.reason,
+        parent=parent.name if parent else "",
+        parent_id=bundle.policy_id if bundle else "",
+        created_stamp_ns=time.time_ns(),
+    )
+    write_policy(
+        directory,
+        result.policy,
+        lineage=Lineage(
+            parent_id=record.parent_id,
+            run_id=run_id,
+            algorithm=record.algorithm,
+            steps=record.steps,
+            seed=record.seed,
+            environments=record.environments,
+            trained_in=trained_in,
+        ),
+        profile=settings.target_robot,
+        simulation=settings.simulation,
+    )
+    write_curve(directory, result.curve)
+    write_record(directory / TRAINING_FILE, asdict(record))
+    return record
