@@ -23,7 +23,7 @@ from flows.prefect_environment import (
 from flows.server_announcement import announced_server
 from ses_core.errors import SesError, SettingsError
 
-START_LIMIT_S = 120.0
+START_LIMIT_S = 180.0
 """A first start migrates the database: 13 s on an idle machine, far more on a busy one."""
 
 
