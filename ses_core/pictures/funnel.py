@@ -1,31 +1,16 @@
-"""The funnel of a night: from logs to synthesized environments, under both counts."""
+"""The funnel of a night as bars (leaf: matplotlib)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from ses_core.extraction.funnel import FunnelStep
 from ses_core.pictures.figures import LIGHT, Theme, new_axes, new_figure, png_bytes
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FunnelStep:
-    """One level of the funnel.
-
-    Attributes:
-        name: What is counted.
-        count: How many, under the count that chose tonight.
-        other: How many under the other count, where that differs in kind.
-    """
-
-    name: str
-    count: int
-    other: int | None = None
 
 
 def funnel_figure(
     steps: Sequence[FunnelStep], *, count_name: str, other_name: str, theme: Theme = LIGHT
 ) -> bytes:
     """Draw the steps from top to bottom as bars, a second bar where the other count stands."""
-    figure = new_figure(7.2, 0.55 + 0.46 * len(steps), theme=theme)
+    figure = new_figure(7.2, 0.85 + 0.46 * len(steps), theme=theme)
     axes = new_axes(figure, theme=theme)
     widest = max([1, *(step.count for step in steps), *(step.other or 0 for step in steps)])
     for row, step in enumerate(steps):
@@ -40,7 +25,9 @@ def funnel_figure(
     if any(step.other is not None for step in steps):
         axes.barh(0, 0, color=theme.series[0], label=f"by {count_name}")
         axes.barh(0, 0, color=theme.series[4], label=f"by {other_name}")
-        axes.legend(loc="lower right", frameon=False, labelcolor=theme.ink, fontsize=9)
+        figure.legend(
+            loc="outside lower center", ncols=2, frameon=False, labelcolor=theme.ink, fontsize=9
+        )
     axes.set_yticks(range(len(steps)), [step.name for step in steps])
     axes.set_ylim(len(steps) - 0.5, -0.5)
     axes.set_xlim(0, widest * 1.12)

@@ -1,4 +1,4 @@
-"""Environments as pictures: one small, or many on a contact sheet."""
+"""Environments as pictures: one small, or many on a contact sheet (leaf: matplotlib)."""
 
 import io
 import math

@@ -1,4 +1,4 @@
-"""How many scenarios are challenging, whatever the threshold had been."""
+"""How many scenarios are challenging, whatever the threshold had been (leaf: matplotlib)."""
 
 from collections.abc import Mapping
 
@@ -37,7 +37,7 @@ def threshold_sensitivity_figure(
             thresholds, counts, where="post", color=color, linestyle=style, linewidth=2, label=name
         )
     axes.axvline(threshold, color=theme.series[1], linewidth=1.2)
-    axes.annotate(
+    mark = axes.annotate(
         f"threshold {threshold:g}",
         (threshold, 1.0),
         xycoords=("data", "axes fraction"),
@@ -46,11 +46,15 @@ def threshold_sensitivity_figure(
         color=theme.ink,
         size=9,
         va="top",
+        annotation_clip=True,
     )
+    # A threshold beyond the axis would else squeeze the figure to reach its label.
+    mark.set_in_layout(False)
     axes.set_xlabel("count that a scenario has to exceed")
     axes.set_ylabel("challenging scenarios")
     axes.set_xlim(float(thresholds[0]), float(thresholds[-1]))
-    axes.set_ylim(bottom=0)
+    highest = max(int(counts.max()) for counts in challenging.values())
+    axes.set_ylim(0.0, max(1.0, 1.05 * highest))
     if scenario_count > 0:
         shares = axes.secondary_yaxis(
             "right",
