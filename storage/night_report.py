@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 
 from ses_core.arrays import BoolArray, FloatArray, IntArray
 from ses_core.evaluation.comparison import Comparison
+from ses_core.evaluation.episodes import Episode
 from ses_core.evaluation.statistics import PolicySummary
-from ses_core.pictures.funnel import FunnelStep
+from ses_core.extraction.funnel import FunnelStep
+from ses_core.learning.training_curve import CurvePoint
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +100,7 @@ class SynthesisUse:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingUse:
-    """What was trained; `learning_curve` is a PNG."""
+    """What was trained, from which policy, and how training episodes went."""
 
     policy: str
     parent: str
@@ -106,18 +108,18 @@ class TrainingUse:
     decisions: int
     environments: int
     seconds: float
-    learning_curve: bytes | None = None
+    curve: tuple[CurvePoint, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluationUse:
-    """Trials on held-out worlds: rows in the order they are shown; `figure` is a PNG."""
+    """Trials on held-out worlds: policies and trials in the order they are shown."""
 
     rows: tuple[PolicySummary, ...]
     comparisons: tuple[Comparison, ...]
     worlds: int
+    episodes: tuple[Episode, ...] = ()
     remarks: tuple[str, ...] = ()
-    figure: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,8 +196,8 @@ def headline(report: NightReport) -> str:
     ending = "it is the champion now" if report.decision.is_promoted else "nothing was promoted"
     return (
         f"{trained}. On worlds it had never seen it succeeds in "
-        f"{100.0 * rates[comparison.policy]:.0f} % of trials, the policy it came from in "
-        f"{100.0 * rates[comparison.baseline]:.0f} %: {report.decision.verdict}, {ending}."
+        f"{_percent(rates[comparison.policy])} of trials, the policy it came from in "
+        f"{_percent(rates[comparison.baseline])}: {report.decision.verdict}, {ending}."
     )
 
 
@@ -208,3 +210,7 @@ def _against_parent(parent: str, evaluation: EvaluationUse | None) -> Comparison
 
 def _count(number: int, noun: str) -> str:
     return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f}\N{NO-BREAK SPACE}%"

@@ -1,28 +1,27 @@
-"""The page of one night: a single HTML file that needs nothing but itself."""
+"""The page of one night: a single HTML file that needs nothing but itself (leaf: matplotlib)."""
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from ses_core.evaluation.statistics import Interval
-from ses_core.pictures.figures import DARK, LIGHT
+from ses_core.pictures.evaluation_figure import draw_evaluation, draw_worlds
+from ses_core.pictures.figures import DARK, LIGHT, Theme
 from ses_core.pictures.funnel import funnel_figure
 from ses_core.pictures.gallery import thumbnail
+from ses_core.pictures.learning_curve import draw_learning_curve
 from ses_core.pictures.threshold_sensitivity import threshold_sensitivity_figure
 from storage.durable_files import replace_file
-from storage.night_report import (
-    Funnel,
-    NightReport,
-    Sensitivity,
-    ShownEnvironment,
-    headline,
-)
+from storage.night_report import NightReport, ShownEnvironment, headline
 
-GALLERY_LIMIT = 100
-"""Pictures shown of each gallery, so that the page opens at once; the rest is counted."""
+GALLERY_LIMIT = 200
+"""Most pictures in a gallery, so that the page opens at once; the rest is counted."""
+
+GALLERY_OPENING = 33
+"""Pictures of a gallery that are seen at first; the others unfold."""
 
 
 def write_report(path: Path, report: NightReport) -> None:
@@ -60,45 +59,69 @@ def render_page(report: NightReport) -> str:
     return environment.get_template("night.html").render(
         report=report,
         headline=headline(report),
-        funnel_picture=_funnel_picture(report.funnel) if report.funnel else "",
-        sensitivity_picture=_sensitivity_picture(report.sensitivity) if report.sensitivity else "",
+        pictures=_pictures(report),
         gallery_limit=GALLERY_LIMIT,
+        gallery_opening=GALLERY_OPENING,
     )
 
 
-def _funnel_picture(funnel: Funnel) -> Markup:
-    light, dark = (
-        funnel_figure(
-            funnel.steps, count_name=funnel.count_name, other_name=funnel.other_name, theme=theme
+def _pictures(report: NightReport) -> dict[str, Markup]:
+    """Draw the figures that the night has data for, each for light and for dark pages."""
+    drawings: dict[str, tuple[str, Callable[[Theme], bytes]]] = {}
+    if funnel := report.funnel:
+        drawings["funnel"] = (
+            "; ".join(f"{step.name}: {step.count}" for step in funnel.steps),
+            lambda theme: funnel_figure(
+                funnel.steps,
+                count_name=funnel.count_name,
+                other_name=funnel.other_name,
+                theme=theme,
+            ),
         )
-        for theme in (LIGHT, DARK)
-    )
-    words = "; ".join(f"{step.name}: {step.count}" for step in funnel.steps)
-    return _picture(light, words, dark)
-
-
-def _sensitivity_picture(sensitivity: Sensitivity) -> Markup:
-    light, dark = (
-        threshold_sensitivity_figure(
-            sensitivity.thresholds,
-            sensitivity.challenging,
-            threshold=sensitivity.threshold,
-            scenario_count=sensitivity.scenario_count,
-            theme=theme,
+    if sensitivity := report.sensitivity:
+        drawings["sensitivity"] = (
+            "challenging scenarios against the threshold",
+            lambda theme: threshold_sensitivity_figure(
+                sensitivity.thresholds,
+                sensitivity.challenging,
+                threshold=sensitivity.threshold,
+                scenario_count=sensitivity.scenario_count,
+                theme=theme,
+            ),
         )
-        for theme in (LIGHT, DARK)
-    )
-    return _picture(light, "challenging scenarios against the threshold", dark)
+    if report.training and (curve := report.training.curve):
+        drawings["curve"] = (
+            "learning curve",
+            lambda theme: draw_learning_curve(curve, theme=theme),
+        )
+    if report.evaluation and (rows := report.evaluation.rows):
+        drawings["evaluation"] = (
+            "success and time by policy",
+            lambda theme: draw_evaluation(rows, theme=theme),
+        )
+    if report.evaluation and (episodes := report.evaluation.episodes):
+        drawings["worlds"] = (
+            "success by held-out world",
+            lambda theme: draw_worlds(episodes, theme=theme),
+        )
+    return {
+        name: _themed_picture(draw(LIGHT), draw(DARK), words)
+        for name, (words, draw) in drawings.items()
+    }
 
 
-def _picture(png: bytes, words: str, dark: bytes | None = None) -> Markup:
-    """Embed a PNG, and another one for dark pages where there is one."""
-    image = Markup('<img src="{}" alt="{}" loading="lazy">').format(_data_uri(png), words)
-    if dark is None:
-        return Markup('<div class="sheet">{}</div>').format(image)
+def _themed_picture(light: bytes, dark: bytes, words: str) -> Markup:
+    """Embed a PNG for light pages and its twin for dark ones."""
     return Markup(
-        '<picture><source media="(prefers-color-scheme: dark)" srcset="{}">{}</picture>'
-    ).format(_data_uri(dark), image)
+        '<div class="chart"><picture>'
+        '<source media="(prefers-color-scheme: dark)" srcset="{}"><img src="{}" alt="{}">'
+        "</picture></div>"
+    ).format(_data_uri(dark), _data_uri(light), words)
+
+
+def _picture(png: bytes, words: str) -> Markup:
+    """Embed a PNG drawn on white."""
+    return Markup('<div class="sheet"><img src="{}" alt="{}"></div>').format(_data_uri(png), words)
 
 
 def _gallery(environments: Sequence[ShownEnvironment]) -> Markup:
@@ -113,7 +136,7 @@ def _gallery(environments: Sequence[ShownEnvironment]) -> Markup:
             shown.environment_id,
             escape(shown.caption),
         )
-        for shown in environments[:GALLERY_LIMIT]
+        for shown in environments
     )
 
 

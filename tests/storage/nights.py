@@ -1,0 +1,241 @@
+"""Nights to show: a full one, one without training, one without any log."""
+
+import numpy as np
+
+from ses_core.evaluation.comparison import Comparison
+from ses_core.evaluation.episodes import Episode
+from ses_core.evaluation.statistics import PolicySummary
+from ses_core.extraction.funnel import FunnelStep
+from ses_core.learning.training_curve import CurvePoint
+from storage.night_report import (
+    Decision,
+    EvaluationUse,
+    Funnel,
+    NightReport,
+    RefusedLog,
+    Sensitivity,
+    ShownEnvironment,
+    StageUse,
+    SynthesisUse,
+    TakenLog,
+    TrainingUse,
+)
+from tests.ses_core.synthesis.places import rooms
+
+STAGES = ("ingest", "extract", "filter", "synthesize", "render", "train", "evaluate", "report")
+
+
+def full_night() -> NightReport:
+    """A night with everything in it, a hostile log name included."""
+    return NightReport(
+        run_id="20261122-1f2e3d",
+        batch_date="2026-11-22",
+        decision=Decision(
+            verdict="insufficient evidence",
+            reasons=("12 held-out worlds, at least 100 are needed.",),
+        ),
+        logs=(
+            taken_log(name="<script>alert('log')</script>.bag", robot='jackal"7'),
+            taken_log(name="second.mcap", warnings={"scan_dropout": 3, "pose_jump": 1}),
+        ),
+        refused=(
+            RefusedLog(
+                name="broken & cut.bag",
+                reason="truncated",
+                explanation="the file ends early or is damaged inside",
+            ),
+            RefusedLog(name="odd.bag", reason="bad_clock"),
+        ),
+        known_logs=4,
+        waiting_logs=1,
+        funnel=funnel(pool=64, synthesized=100),
+        sensitivity=sensitivity(),
+        challenging=environments(120, origin="c", captioned=True),
+        synthesis=SynthesisUse(
+            method_asked="gan",
+            method_used="pca",
+            drawn=131,
+            rejected_share=0.2366,
+            repeated=2,
+            copied=5,
+            notes=("99 principal components instead of 100",),
+        ),
+        synthesized=environments(100, origin="s"),
+        training=TrainingUse(
+            policy="night-1f2e3d",
+            parent="original",
+            algorithm="ppo",
+            decisions=12_400,
+            environments=100,
+            seconds=245.2,
+            curve=tuple(curve_point(steps) for steps in range(1000, 13_000, 1000)),
+        ),
+        evaluation=EvaluationUse(
+            rows=(
+                policy_row("night-1f2e3d", 0.712),
+                policy_row("original", 0.681),
+                policy_row("dwa-slow", 0.0),
+            ),
+            comparisons=(
+                Comparison(
+                    policy="night-1f2e3d",
+                    baseline="original",
+                    success_difference=0.031,
+                    ci=(-0.042, 0.109),
+                    time_difference_s=-2.4,
+                    ci_s=(-6.1, 1.2),
+                    trials=240,
+                    worlds=12,
+                ),
+            ),
+            worlds=12,
+            episodes=tuple(
+                episode(policy, world)
+                for policy in ("night-1f2e3d", "original", "dwa-slow")
+                for world in range(12)
+            ),
+            remarks=("3 worlds repeated in PyBullet: 9 of 12 outcomes agree.",),
+        ),
+        stages=tuple(StageUse(name=name, built=1, found=2, seconds=71.3) for name in STAGES),
+        lineage=(("pool", "selection/ab12"), ("policy", "train/cd34")),
+        warnings=("1 robot gave 80 % of the pool.",),
+        demonstration_decisions=12_400,
+    )
+
+
+def untrained_night() -> NightReport:
+    """A night with logs and too few challenging scenarios."""
+    return NightReport(
+        run_id="20261123-aa",
+        batch_date="2026-11-23",
+        decision=Decision(
+            verdict="no training",
+            reasons=("No scenario has more than 50 steps with v < 0.",),
+        ),
+        logs=(taken_log(name="only.bag"),),
+        funnel=funnel(pool=0, synthesized=0),
+        sensitivity=sensitivity(),
+        champion="20261101-77",
+        stages=tuple(StageUse(name=name, built=0, found=1, seconds=0.1) for name in STAGES),
+    )
+
+
+def quiet_night() -> NightReport:
+    """A night on which no log came in."""
+    return NightReport(
+        run_id="20261124-bb",
+        batch_date="2026-11-24",
+        decision=Decision(verdict="nothing new", reasons=("The inbox holds no new log.",)),
+    )
+
+
+def taken_log(
+    *, name: str, robot: str = "jackal-7", warnings: dict[str, int] | None = None
+) -> TakenLog:
+    return TakenLog(
+        name=name,
+        robot=robot,
+        site="home-3",
+        format="rosbag2 mcap",
+        duration_s=3725.0,
+        path_length_m=812.4,
+        scenarios=91,
+        challenging=7,
+        warnings=warnings or {},
+    )
+
+
+def funnel(*, pool: int, synthesized: int) -> Funnel:
+    return Funnel(
+        steps=(
+            FunnelStep(name="logs", count=2),
+            FunnelStep(name="scenarios", count=1240),
+            FunnelStep(name="challenging", count=pool + 20, other=261),
+            FunnelStep(name="to learn from", count=pool, other=160),
+            FunnelStep(name="synthesized", count=synthesized),
+        ),
+        rule="more than 50 steps with v < 0",
+        count_name="steps with v < 0",
+        other_name="steps with v ≤ 0.05 m/s",
+        remarks=("17: usable ones are held out for evaluation.",),
+    )
+
+
+def sensitivity() -> Sensitivity:
+    thresholds = np.arange(0.0, 201.0)
+    return Sensitivity(
+        thresholds=thresholds,
+        challenging={
+            "steps with v < 0": (400 * np.exp(-thresholds / 30)).astype(np.int64),
+            "steps with v ≤ 0.05 m/s": (900 * np.exp(-thresholds / 45)).astype(np.int64),
+        },
+        threshold=50.0,
+        scenario_count=1240,
+    )
+
+
+def environments(
+    count: int, *, origin: str, captioned: bool = False
+) -> tuple[ShownEnvironment, ...]:
+    cells = rooms(count, seed=8)
+    return tuple(
+        ShownEnvironment(
+            environment_id=f"{origin}{index:04d}",
+            cells=place,
+            observed=~np.rot90(place, 2),
+            caption=str(180 - index) if captioned else "",
+            detail="home-3, jackal-7" if captioned else "",
+        )
+        for index, place in enumerate(cells)
+    )
+
+
+def policy_row(policy: str, success_rate: float) -> PolicySummary:
+    succeeds = success_rate > 0.0
+    return PolicySummary(
+        policy=policy,
+        success_rate=success_rate,
+        success_ci=(success_rate, min(1.0, success_rate + 0.12)) if succeeds else None,
+        mean_time_s=27.31 if succeeds else None,
+        mean_time_ci_s=(25.0, 30.2) if succeeds else None,
+        restricted_mean_time_s=48.4,
+        restricted_mean_time_ci_s=(40.0, 55.5) if succeeds else None,
+        collision_rate=0.2,
+        timeout_rate=0.05,
+        stuck_rate=0.038,
+        barn_score=0.3121,
+        barn_score_ci=None,
+        trials=240,
+        worlds=12,
+    )
+
+
+def curve_point(steps: int) -> CurvePoint:
+    share = steps / 13_000
+    return CurvePoint(
+        steps=steps,
+        episodes=40,
+        mean_return=20.0 * share,
+        success_rate=0.5 + 0.3 * share,
+        collision_rate=0.3 - 0.1 * share,
+        mean_time_s=30.0 - 4.0 * share,
+    )
+
+
+def episode(policy: str, world: int) -> Episode:
+    outcome = "success" if (world + len(policy)) % 3 else "collision"
+    return Episode(
+        episode_id=f"{policy}-{world}",
+        run_id="20261122-1f2e3d",
+        policy=policy,
+        world_id=f"world-{world}",
+        pair=0,
+        trial=0,
+        seed=world,
+        outcome=outcome,
+        time_s=20.0 + world,
+        path_length_m=8.0,
+        optimal_time_s=4.0,
+        barn_score=0.2,
+        negative_velocity_count=3,
+    )

@@ -1,0 +1,188 @@
+import base64
+import io
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from storage.night_report import NightReport
+from storage.report_page import GALLERY_LIMIT, render_page, write_report
+from tests.storage.nights import environments, full_night, quiet_night, untrained_night
+
+VOID = {"meta", "link", "br", "img", "source", "hr"}
+NIGHTS = (full_night, untrained_night, quiet_night)
+
+
+class Page(HTMLParser):
+    """Collects a page's tags, links, text and pictures, and checks that tags are closed."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+        self.text += " "
+
+    def handle_data(self, data: str) -> None:
+        if self.open[-1:] != ["style"]:
+            self.text += data + (" " if self.open[-1:] == ["td"] else "")
+
+    def images(self) -> list[bytes]:
+        sources = [attributes.get("src") for tag, attributes in self.tags if tag == "img"]
+        return [base64.b64decode(str(source).split(",", 1)[1]) for source in sources]
+
+
+def plain(page: Page) -> str:
+    """Give a page's text with single spaces and an ASCII minus."""
+    return " ".join(page.text.replace("\N{MINUS SIGN}", "-").split())
+
+
+@pytest.fixture(scope="module")
+def full_page() -> Page:
+    return Page(render_page(full_night()))
+
+
+@pytest.mark.parametrize("night", NIGHTS, ids=lambda item: item.__name__)
+def test_page_needs_nothing_but_itself(night: Callable[[], NightReport]) -> None:
+    html = render_page(night())
+    for _, attributes in Page(html).tags:
+        for name in ("src", "href", "srcset"):
+            if name in attributes:
+                assert str(attributes[name]).startswith("data:")
+    assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", html)
+    assert "@import" not in html
+    assert "url(" not in html
+
+
+def test_equal_reports_give_equal_pages() -> None:
+    assert render_page(untrained_night()) == render_page(untrained_night())
+
+
+def test_names_of_logs_and_robots_are_text_and_never_markup(full_page: Page) -> None:
+    assert not [tag for tag, _ in full_page.tags if tag == "script"]
+    assert "<script>alert('log')</script>.bag" in full_page.text
+    assert 'jackal"7' in full_page.text
+
+
+def test_hostile_identities_cannot_leave_their_attribute() -> None:
+    hostile = '"><script>x()</script>'
+    shown = tuple(
+        replace(item, environment_id=hostile, detail=hostile, caption=hostile)
+        for item in environments(2, origin="h")
+    )
+    page = Page(render_page(replace(quiet_night(), challenging=shown)))
+    assert not [tag for tag, _ in page.tags if tag == "script"]
+    titles = [attributes["title"] for tag, attributes in page.tags if tag == "figure"]
+    assert titles == [f"{hostile} · {hostile}"] * 2
+
+
+def test_every_picture_is_a_whole_png(full_page: Page) -> None:
+    images = full_page.images()
+    # Two galleries and five figures.
+    assert len(images) == 120 + 100 + 5
+    for content in images:
+        with Image.open(io.BytesIO(content)) as image:
+            image.load()
+            assert image.format == "PNG"
+
+
+def test_every_figure_has_a_twin_for_dark_pages(full_page: Page) -> None:
+    sources = [attributes for tag, attributes in full_page.tags if tag == "source"]
+    assert len(sources) == 5
+    assert {item["media"] for item in sources} == {"(prefers-color-scheme: dark)"}
+
+
+def test_places_are_named_on_hovering_and_carry_their_count(full_page: Page) -> None:
+    titles = [str(attributes["title"]) for tag, attributes in full_page.tags if tag == "figure"]
+    assert titles[0] == "c0000 · home-3, jackal-7"
+    assert titles[120] == "s0000"
+    assert "180" in full_page.text
+
+
+def test_table_shows_what_the_paper_shows_and_what_it_leaves_out(full_page: Page) -> None:
+    text = plain(full_page)
+    for words in (
+        "Policy Success Time of successes Restricted time Collision Time-out Stuck BARN score",
+        "night-1f2e3d 71.2 % 71 to 83 27.3 s 25.0 to 30.2 48.4 s 40.0 to 55.5 20.0 % 5.0 % 3.8 %",
+        "dwa-slow 0.0 % none 48.4 s",
+        "+3.1 points -4.2 to +10.9 -2.4 s -6.1 to +1.2",
+    ):
+        assert words in text
+
+
+def test_page_says_what_was_refused_reused_and_decided(full_page: Page) -> None:
+    text = plain(full_page)
+    for words in (
+        "This is a demonstration, not evidence: 12,400 decisions trained",
+        "12 held-out worlds, at least 100 are needed.",
+        "broken & cut.bag the file ends early or is damaged inside truncated",
+        "odd.bag bad clock bad_clock",
+        "4 known from earlier nights, 1 still arriving",
+        "second.mcap jackal-7 home-3 rosbag2 mcap 1 h 02 min 812 m 91 7",
+        "scan dropout: 3, pose jump: 1",
+        "100 environments by pca (asked for: gan): 131 samples drawn, 23.7 % of them",
+        "99 principal components instead of 100",
+        "train 1 2 1 min 11 s",
+        "pool selection/ab12",
+        "1 robot gave 80 % of the pool.",
+        "challenging 84 261",
+    ):
+        assert words in text, words
+
+
+def test_a_night_without_training_shows_its_funnel_and_no_empty_sections() -> None:
+    text = Page(render_page(untrained_night())).text
+    assert "From logs to training environments" in text
+    assert "20261101-77" in text
+    for heading in (
+        "Training",
+        "On worlds it has never seen",
+        "What the policy was trained in",
+        "demonstration",
+        "Refused",
+        "Where robots struggled",
+    ):
+        assert heading not in text
+
+
+def test_a_night_without_logs_is_a_short_page() -> None:
+    html = render_page(quiet_night())
+    assert "No new log came in." in Page(html).text
+    assert len(html) < 10_000
+
+
+def test_an_evaluation_without_worlds_says_that_nothing_was_measured() -> None:
+    night = full_night()
+    assert night.evaluation is not None
+    empty = replace(night.evaluation, rows=(), comparisons=(), worlds=0, episodes=())
+    text = Page(render_page(replace(night, evaluation=empty))).text
+    assert "No world was held out, so nothing was measured." in text
+
+
+def test_a_long_gallery_is_cut_and_counted() -> None:
+    many = environments(GALLERY_LIMIT + 40, origin="c")
+    page = Page(render_page(replace(quiet_night(), challenging=many)))
+    assert len(page.images()) == GALLERY_LIMIT
+    assert f"{GALLERY_LIMIT} of {GALLERY_LIMIT + 40}" in page.text
+
+
+def test_a_full_page_stays_small(tmp_path: Path) -> None:
+    path = tmp_path / "index.html"
+    write_report(path, full_night())
+    assert path.stat().st_size < 1_000_000
+    assert path.read_text(encoding="utf-8") == render_page(full_night())
