@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ses_core.arrays import BoolArray
 from ses_core.extraction.difficulty import measure_difficulty
-from ses_core.navigation import NavigationDomain, NavigationEnvironment
-from ses_core.occupancy import ENVIRONMENT_CELLS, ENVIRONMENT_RESOLUTION_M
+from ses_core.navigation import NavigationDomain
+from ses_core.occupancy import ENVIRONMENT_RESOLUTION_M
 from ses_core.robot_profile import RobotProfile
 from storage.parquet_files import read_table, write_table
+from storage.scenario_tables import environments_of
 
 ENVIRONMENTS_FILE = "environments.parquet"
 
@@ -68,25 +68,5 @@ def read_environments(directory: Path) -> NavigationDomain:
         ArtifactError: The file is missing or damaged.
         SchemaError: It is no table of environments.
     """
-    rows = read_table(
-        directory / ENVIRONMENTS_FILE,
-        "environments",
-        ["environment_id", "scenario_id", "origin", "cells", "observed"],
-    )
-    return NavigationDomain(
-        tuple(
-            NavigationEnvironment(
-                environment_id=str(row["environment_id"]),
-                scenario_id=str(row["scenario_id"]),
-                origin=str(row["origin"]),
-                cells=_square(row["cells"]),
-                observed=_square(row["observed"]),
-            )
-            for row in rows.to_dict("records")
-        )
-    )
-
-
-def _square(values: object) -> BoolArray:
-    side = ENVIRONMENT_CELLS
-    return np.asarray(values, dtype=np.bool_).reshape(side, side)
+    rows = read_table(directory / ENVIRONMENTS_FILE, "environments")
+    return NavigationDomain(tuple(environments_of(rows)))
