@@ -11,6 +11,7 @@ import os
 import resource
 import signal
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1
@@ -24,7 +25,7 @@ def main() -> int:
     request_path = Path(sys.argv[1])
     request = json.loads(request_path.read_text(encoding="utf-8"))
     _confine(request["limits"], parent=int(request["parent"]))
-    outcome = _decode(request)
+    outcome = decode_request(request, scratch=Path.cwd())
     (request_path.parent / "outcome.json").write_text(json.dumps(outcome), encoding="utf-8")
     return 0
 
@@ -48,7 +49,7 @@ def _confine(limits: dict[str, int], *, parent: int) -> None:
         resource.setrlimit(kind, (allowed, allowed))
 
 
-def _decode(request: dict[str, object]) -> dict[str, str]:
+def decode_request(request: Mapping[str, object], *, scratch: Path) -> dict[str, str]:
     """Decode the log and say how it went: the reason is empty where it went well."""
     # Imported under the limits, so that what they need counts too.
     from ses_core.errors import LogError
@@ -60,7 +61,7 @@ def _decode(request: dict[str, object]) -> dict[str, str]:
     limits = DecoderLimits.model_validate(request["limits"])
     profile = RobotProfile.model_validate(request["profile"])
     output = Path(str(request["output"]))
-    reader = make_reader(str(request["format"]), limits=limits, workdir=Path.cwd())
+    reader = make_reader(str(request["format"]), limits=limits, workdir=scratch)
     try:
         recording = reader.read(
             Path(str(request["log"])), profile=profile, pose_source=str(request["pose_source"])

@@ -58,11 +58,6 @@ class Candidate:
         """Name as uploaded."""
         return self.path.name
 
-    @property
-    def is_folder(self) -> bool:
-        """Whether it is a folder of parts."""
-        return self.files != (self.path,)
-
 
 @dataclass(frozen=True, slots=True)
 class KnownUpload:
