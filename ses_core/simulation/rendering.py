@@ -62,16 +62,20 @@ def render(grid: OccupancyGrid) -> RenderedWorld:
     )
 
 
-@compiled
 def merge_boxes(cells: BoolArray) -> IntArray:
     """Cover the occupied cells (H, W) once by rectangles (B, 4): rows and columns [low, high).
 
     Greedy: from the first cell not yet covered as far along its row as possible, then as many
     rows further as are occupied over that whole length.
     """
-    height, width = cells.shape
-    waiting = cells.copy()
     boxes = np.empty((np.count_nonzero(cells), 4), dtype=np.int64)
+    return boxes[: _merge(cells.copy(), boxes)].copy()
+
+
+@compiled
+def _merge(waiting: BoolArray, boxes: IntArray) -> int:
+    """Fill `boxes` and give their number; what is covered waits no longer."""
+    height, width = waiting.shape
     count = 0
     for row in range(height):
         for column in range(width):
@@ -81,12 +85,20 @@ def merge_boxes(cells: BoolArray) -> IntArray:
             while right < width and waiting[row, right]:
                 right += 1
             top = row + 1
-            while top < height and waiting[top, column:right].all():
+            while top < height:
+                is_full = True
+                for k in range(column, right):
+                    is_full = is_full and waiting[top, k]
+                if not is_full:
+                    break
                 top += 1
-            waiting[row:top, column:right] = False
-            boxes[count] = (row, column, top, right)
+            for covered in range(row, top):
+                for k in range(column, right):
+                    waiting[covered, k] = False
+            boxes[count, 0], boxes[count, 1] = row, column
+            boxes[count, 2], boxes[count, 3] = top, right
             count += 1
-    return boxes[:count].copy()
+    return count
 
 
 def obj_text(rendered: RenderedWorld, *, name: str) -> str:
