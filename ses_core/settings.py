@@ -137,7 +137,7 @@ class GanSettings(SettingsModel):
         "teaches it nothing once D is ahead.",
     )
     least_updates: int = Field(
-        3000, ge=1, description="Updates made even where the epochs would make fewer."
+        2000, ge=1, description="Updates made even where the epochs would make fewer."
     )
     least_environments: int = Field(
         30, ge=2, description="With fewer to learn from, the recorded places are copied instead."

@@ -128,9 +128,8 @@ def _train(
     per_epoch = len(real) // batch_size
     epochs = max(settings.epochs, math.ceil(settings.least_updates / per_epoch))
     betas = (settings.adam_beta1, 0.999)
-    optimiser_g = torch.optim.Adam(
-        generator.parameters(), lr=settings.learning_rate, betas=betas, fused=True
-    )
+    weights_g = list(generator.parameters())
+    optimiser_g = torch.optim.Adam(weights_g, lr=settings.learning_rate, betas=betas, fused=True)
     optimiser_d = torch.optim.Adam(
         discriminator.parameters(), lr=settings.learning_rate, betas=betas, fused=True
     )
@@ -148,7 +147,7 @@ def _train(
 
             loss_g = generator_loss(discriminator(torch.cat((batch, fake))), loss=settings.loss)
             optimiser_g.zero_grad(set_to_none=True)
-            torch.autograd.backward(loss_g)
+            torch.autograd.backward(loss_g, inputs=weights_g)
             optimiser_g.step()
         progress((epoch + 1) / epochs)
 
