@@ -56,11 +56,14 @@ class Funnel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensitivity:
-    """Challenging scenarios by threshold: thresholds (T,), counts (T,) by kind of count."""
+    """Challenging scenarios by threshold: thresholds (T,), counts (T,) by kind of count.
+
+    `threshold` is the one in force; None where a share was chosen instead.
+    """
 
     thresholds: FloatArray
     challenging: Mapping[str, IntArray]
-    threshold: float
+    threshold: float | None
     scenario_count: int
 
 

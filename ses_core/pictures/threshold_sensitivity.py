@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ses_core.arrays import FloatArray, IntArray
 from ses_core.pictures.figures import LIGHT, Theme, new_axes, new_figure, png_bytes
@@ -12,7 +13,7 @@ def threshold_sensitivity_figure(
     thresholds: FloatArray,
     challenging: Mapping[str, IntArray],
     *,
-    threshold: float,
+    threshold: float | None,
     scenario_count: int,
     theme: Theme = LIGHT,
 ) -> bytes:
@@ -21,7 +22,7 @@ def threshold_sensitivity_figure(
     Args:
         thresholds: (T,) counts that a scenario has to exceed.
         challenging: By kind of count, (T,) scenarios above each threshold.
-        threshold: The one in force, marked.
+        threshold: The one in force, marked; None where a share was chosen instead.
         scenario_count: All scenarios, for the axis of shares.
         theme: Colours.
     """
@@ -36,20 +37,8 @@ def threshold_sensitivity_figure(
         axes.step(
             thresholds, counts, where="post", color=color, linestyle=style, linewidth=2, label=name
         )
-    axes.axvline(threshold, color=theme.series[1], linewidth=1.2)
-    mark = axes.annotate(
-        f"threshold {threshold:g}",
-        (threshold, 1.0),
-        xycoords=("data", "axes fraction"),
-        xytext=(4, -2),
-        textcoords="offset points",
-        color=theme.ink,
-        size=9,
-        va="top",
-        annotation_clip=True,
-    )
-    # A threshold beyond the axis would else squeeze the figure to reach its label.
-    mark.set_in_layout(False)
+    if threshold is not None:
+        _mark(axes, threshold, theme=theme)
     axes.set_xlabel("count that a scenario has to exceed")
     axes.set_ylabel("challenging scenarios")
     axes.set_xlim(float(thresholds[0]), float(thresholds[-1]))
@@ -68,3 +57,20 @@ def threshold_sensitivity_figure(
         shares.spines["right"].set_color(theme.faint)
     axes.legend(frameon=False, labelcolor=theme.ink, fontsize=9, loc="upper right")
     return png_bytes(figure)
+
+
+def _mark(axes: Axes, threshold: float, *, theme: Theme) -> None:
+    axes.axvline(threshold, color=theme.series[1], linewidth=1.2)
+    mark = axes.annotate(
+        f"threshold {threshold:g}",
+        (threshold, 1.0),
+        xycoords=("data", "axes fraction"),
+        xytext=(4, -2),
+        textcoords="offset points",
+        color=theme.ink,
+        size=9,
+        va="top",
+        annotation_clip=True,
+    )
+    # A threshold beyond the axis would else squeeze the figure to reach its label.
+    mark.set_in_layout(False)
