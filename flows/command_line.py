@@ -14,7 +14,9 @@ from flows import (
     log_commands,
     night_commands,
     policy_commands,
+    quarantine_commands,
     serve_commands,
+    show_commands,
     store_commands,
     world_commands,
 )
@@ -35,6 +37,8 @@ app = typer.Typer(
 for group in (
     night_commands,
     log_commands,
+    show_commands,
+    quarantine_commands,
     world_commands,
     policy_commands,
     store_commands,

@@ -13,7 +13,9 @@ LOOPBACK = "127.0.0.1"
 CONSOLE = {
     "PREFECT_LOGGING_HANDLERS_CONSOLE_CLASS": "flows.progress_display.ConsoleHandler",
     "PREFECT_LOGGING_FORMATTERS_STANDARD_FLOW_RUN_FMT": "%(asctime)s  %(message)s",
-    "PREFECT_LOGGING_FORMATTERS_STANDARD_TASK_RUN_FMT": "%(asctime)s  %(message)s",
+    "PREFECT_LOGGING_FORMATTERS_STANDARD_TASK_RUN_FMT": (
+        "%(asctime)s  %(task_run_name)s: %(message)s"
+    ),
 }
 """Prefect's logging configuration, item by item, for people at a terminal."""
 

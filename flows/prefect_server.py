@@ -26,6 +26,8 @@ from ses_core.errors import SesError, SettingsError
 START_LIMIT_S = 180.0
 """A first start migrates the database: 13 s on an idle machine, far more on a busy one."""
 
+SEND_LIMIT_S = 5.0
+
 
 class ServerError(SesError):
     """The Prefect server did not start, or ended before its time."""
@@ -145,8 +147,22 @@ def embedded_server(root: Path) -> Iterator[None]:
 
         server.wait_until_healthy()
         yield
+        _send_what_is_queued()
     finally:
         server.stop()
+
+
+def _send_what_is_queued() -> None:
+    """Send the logs and events of our runs while there is a server for them.
+
+    Prefect sends them in the background, and at exit tries for minutes to reach a server that has
+    ended.
+    """
+    from prefect.events.worker import EventsWorker
+    from prefect.logging.handlers import APILogWorker
+
+    APILogWorker.drain_all(timeout=SEND_LIMIT_S)
+    EventsWorker.drain_all(timeout=SEND_LIMIT_S)
 
 
 def _last_line(log: Path) -> str:

@@ -1,0 +1,116 @@
+"""`ses show`: a picture and the facts of a log, a scenario or an environment."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flows.command_context import aligned, command_context
+from ses_core.recipes import JsonValue
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ses_core.settings import Settings
+    from storage.layout import Layout
+
+app = typer.Typer()
+
+IdArgument = Annotated[
+    str, typer.Argument(metavar="ID", help="Of a scenario, an environment or a log.")
+]
+TABLES = {"scenarios": "scenario_id", "environments": "environment_id", "logs": "log_id"}
+UNSHOWN = ("cells", "observed")
+
+
+@app.command(epilog="Example: ses show 0f3c9a51d2b7e864 --out scenario.png")
+def show(
+    context: typer.Context,
+    identity: IdArgument,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw it there; else <ID>.png.")
+    ] = None,
+) -> None:
+    """Draw a scenario with its scans and its place, an environment, or a whole log."""
+    from storage.durable_files import replace_file
+
+    command = command_context(context)
+    layout = command.existing_store()
+    table, row = find_row(layout, identity)
+    target = (out or Path(f"{identity}.png")).absolute()
+    picture = draw(layout, table, row, command.settings())
+    target.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(target, picture)
+    facts = {name: value for name, value in row.items() if name not in UNSHOWN}
+    facts["picture"] = str(target)
+    listed: list[dict[str, JsonValue]] = [{"what": key, "value": facts[key]} for key in facts]
+    command.answer([facts], lambda: aligned(listed))
+
+
+def find_row(layout: "Layout", identity: str) -> tuple[str, dict[str, JsonValue]]:
+    """Find the table and the row that an id names.
+
+    Raises:
+        typer.BadParameter: Nothing has this id.
+    """
+    from storage.table_reader import open_table
+
+    for table, column in TABLES.items():
+        rows = open_table(layout.root, table)
+        found = rows[rows[column] == identity]
+        if len(found):
+            return table, _plain(found.iloc[0])
+    raise typer.BadParameter(
+        f"found {identity!r}, expected the id of a scenario, an environment or a log",
+        param_hint="ID",
+    )
+
+
+def draw(layout: "Layout", table: str, row: Mapping[str, JsonValue], settings: "Settings") -> bytes:
+    """Draw what a row describes, as PNG."""
+    if table == "environments" and not row["scenario_id"]:
+        from ses_core.pictures.environment_figure import environment_figure
+        from storage.scenario_tables import environments_of
+        from storage.table_reader import open_table
+
+        rows = open_table(layout.root, "environments")
+        (environment,) = environments_of(rows[rows["environment_id"] == row["environment_id"]])
+        return environment_figure(environment, target=settings.target_robot)
+    return _draw_recorded(layout, row, settings)
+
+
+def _draw_recorded(layout: "Layout", row: Mapping[str, JsonValue], settings: "Settings") -> bytes:
+    """Draw a log, or the scenario that a row of scenarios or environments is of."""
+    from ses_core.pictures.log_figure import log_figure
+    from ses_core.pictures.scenario_figure import scenario_figure
+    from storage.shown_logs import read_shown_log
+    from storage.table_reader import open_table
+
+    log_id = row.get("log_id")
+    scenario_id = row.get("scenario_id")
+    if log_id is None:
+        scenarios = open_table(layout.root, "scenarios", columns=["scenario_id", "log_id"])
+        log_id = scenarios.loc[scenarios["scenario_id"] == scenario_id, "log_id"].iloc[0]
+    log = read_shown_log(layout, str(log_id), settings=settings)
+    if scenario_id is None:
+        return log_figure(log.extracted, log.trajectories, title=log.name)
+    extracted, trajectory = log.scenario(str(scenario_id))
+    return scenario_figure(
+        extracted,
+        trajectory,
+        target=settings.target_robot,
+        scan_margin=settings.extraction.scan_margin_s,
+    )
+
+
+def _plain(row: "pd.Series") -> dict[str, JsonValue]:
+    """Give a row as JSON values; what is missing is null."""
+    import pandas as pd
+
+    plain: dict[str, JsonValue] = {}
+    for name, value in row.items():
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        plain[str(name)] = value if isinstance(value, list) or not pd.isna(value) else None
+    return plain
