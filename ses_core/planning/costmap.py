@@ -13,7 +13,7 @@ import numpy as np
 from ses_core.arrays import ByteArray, Float32Array, FloatArray
 from ses_core.compilation import compiled
 from ses_core.simulation.robot import RobotModel
-from ses_core.simulation.state import Memory, Scratch, Slot
+from ses_core.simulation.state import Int16Array, Int32Array, Memory, Scratch, Slot
 
 RESOLUTION_M = 0.05
 """Cell size of the costmap [m]."""
@@ -42,7 +42,14 @@ WINDOW_SIZE = WINDOW_CELLS + 2
 """Edge of the local costmap with a border of one cell that no search crosses."""
 
 _HALF_WINDOW = WINDOW_CELLS // 2
+_FAR_16 = np.int16(FAR_CELLS)
+_FAR_SQUARED = np.int16(FAR)
+_BEYOND = np.int16(FAR_CELLS * FAR_CELLS)
 _SEEN_NOW = 2  # flag on a mark while one scan is worked in
+
+# A step along a beam goes one cell on its faster axis, at most sqrt(2) cells; where the nearest
+# mark is d cells away, what is nearer can be skipped, less 3/4 of a cell of rounding.
+_LEAPS = np.maximum(1, ((np.sqrt(np.arange(256)) - 0.75) / 1.4143).astype(np.int64))
 
 
 @compiled
@@ -71,6 +78,7 @@ def work_in_scan(
     memory: Memory,
     ranges: Float32Array,
     robot: RobotModel,
+    hits: Int32Array,
     clears_footprint: bool,
 ) -> None:
     """Mark hits, clear what beams pass through and what the robot stands on.
@@ -79,41 +87,39 @@ def work_in_scan(
     that this scan would clear and set again was never gone.
 
     Args:
+        hits: Working space for the cells of at least B hits.
         clears_footprint: costmap_2d's `footprint_clearing_enabled`.
     """
     cosine, sine = math.cos(slot.yaw), math.sin(slot.yaw)
-    laser_x = slot.x + cosine * robot.mount_x - sine * robot.mount_y
-    laser_y = slot.y + sine * robot.mount_x + cosine * robot.mount_y
-    laser_yaw = slot.yaw + robot.mount_yaw
-    from_column = (laser_x - slot.map_x) / RESOLUTION_M
-    from_row = (laser_y - slot.map_y) / RESOLUTION_M
-    reach = OBSTACLE_RANGE_M / RESOLUTION_M
-    hits = 0
+    column = (slot.x + cosine * robot.mount_x - sine * robot.mount_y - slot.map_x) / RESOLUTION_M
+    row = (slot.y + sine * robot.mount_x + cosine * robot.mount_y - slot.map_y) / RESOLUTION_M
+    cosine, sine = math.cos(slot.yaw + robot.mount_yaw), math.sin(slot.yaw + robot.mount_yaw)
+    count = 0
     for beam in range(ranges.shape[0]):
-        cells = ranges[beam] / RESOLUTION_M
-        if cells >= reach:
+        if ranges[beam] >= OBSTACLE_RANGE_M:
             continue
-        angle = laser_yaw + robot.beam_angles[beam]
-        index = _map_index(
-            slot, from_column + cells * math.cos(angle), from_row + cells * math.sin(angle)
-        )
-        if index >= 0:
+        cells = ranges[beam] / RESOLUTION_M
+        along_x = cosine * robot.beams[beam, 0] - sine * robot.beams[beam, 1]
+        along_y = sine * robot.beams[beam, 0] + cosine * robot.beams[beam, 1]
+        index = _map_index(slot, column + cells * along_x, row + cells * along_y)
+        if index >= 0 and memory.marks[index] < _SEEN_NOW:
             memory.marks[index] |= _SEEN_NOW
-            hits += 1
+            hits[count] = index
+            count += 1
     for beam in range(ranges.shape[0]):
         if ranges[beam] < np.inf:
-            _clear_along(
-                slot,
-                memory,
-                from_column,
-                from_row,
-                laser_yaw + robot.beam_angles[beam],
-                min(ranges[beam], RAYTRACE_RANGE_M) / RESOLUTION_M,
-            )
+            along_x = cosine * robot.beams[beam, 0] - sine * robot.beams[beam, 1]
+            along_y = sine * robot.beams[beam, 0] + cosine * robot.beams[beam, 1]
+            cells = min(ranges[beam], RAYTRACE_RANGE_M) / RESOLUTION_M
+            _clear_along(slot, memory, column, row, along_x, along_y, cells)
     if clears_footprint:
         _clear_footprint(slot, memory, robot)
-    if hits > 0:
-        _settle_marks(slot, memory, from_column, from_row)
+    for k in range(count):
+        mark = memory.marks[hits[k]]
+        if mark >= _SEEN_NOW:
+            if mark == _SEEN_NOW:
+                _note_change(slot, hits[k])
+            memory.marks[hits[k]] = 1
 
 
 @compiled
@@ -126,14 +132,15 @@ def _map_index(slot: Slot, column: float, row: float) -> int:
 
 @compiled
 def _clear_along(
-    slot: Slot, memory: Memory, column: float, row: float, angle: float, length: float
+    slot: Slot,
+    memory: Memory,
+    column: float,
+    row: float,
+    along_x: float,
+    along_y: float,
+    length: float,
 ) -> None:
-    """Clear the marks on one beam, its last cell included, leaping where none are near.
-
-    A step goes one cell along the faster axis, at most sqrt(2) cells; a cell whose nearest
-    mark is d cells away lets the walk skip what is nearer, less 3/4 of a cell of rounding.
-    """
-    along_x, along_y = math.cos(angle), math.sin(angle)
+    """Clear the marks on one beam, its last cell included, leaping where none are near."""
     pace = max(abs(along_x), abs(along_y))
     along_x, along_y = along_x / pace, along_y / pace
     steps = int(length * pace)
@@ -145,8 +152,7 @@ def _clear_along(
         if memory.marks[index] == 1:
             memory.marks[index] = 0
             _note_change(slot, index)
-        near = math.sqrt(float(memory.distances[index]))
-        step += max(1, int((near - 0.75) / 1.4143))
+        step += _LEAPS[memory.distances[index]]
 
 
 @compiled
@@ -183,22 +189,6 @@ def is_inside(sides: FloatArray, x: float, y: float) -> bool:
 
 
 @compiled
-def _settle_marks(slot: Slot, memory: Memory, column: float, row: float) -> None:
-    """Turn the cells flagged by this scan into marks."""
-    reach = int(OBSTACLE_RANGE_M / RESOLUTION_M) + 2
-    first_row, last_row = max(int(row) - reach, 0), min(int(row) + reach, slot.map_height - 1)
-    first = max(int(column) - reach, 0)
-    last = min(int(column) + reach, slot.map_width - 1)
-    for cell_row in range(first_row, last_row + 1):
-        start = slot.map_offset + cell_row * slot.map_width
-        for index in range(start + first, start + last + 1):
-            if memory.marks[index] >= _SEEN_NOW:
-                if memory.marks[index] == _SEEN_NOW:
-                    _note_change(slot, index)
-                memory.marks[index] = 1
-
-
-@compiled
 def _note_change(slot: Slot, index: int) -> None:
     cell = index - slot.map_offset
     row = cell // slot.map_width
@@ -230,52 +220,62 @@ def refresh_distances(slot: Slot, memory: Memory, scratch: Scratch, worker: int)
     right = min(slot.changed_right + FAR_CELLS, width)
     bottom = max(slot.changed_bottom - FAR_CELLS + 1, 0)
     top = min(slot.changed_top + FAR_CELLS, height)
-    # Squared distances along columns, with 16 cells to either side of the changed ones.
     columns = scratch.columns[worker]
     first, last = max(left - FAR_CELLS, 0), min(right + FAR_CELLS, width)
-    shift = FAR_CELLS - left  # column c of the map lies at c + shift
-    span = right - left
-    beyond = FAR_CELLS * FAR_CELLS
-    columns[: top - bottom, : span + 2 * FAR_CELLS] = beyond
+    into = first - left + FAR_CELLS  # column `left` of the map lies at place 16
+    span, reached = right - left, last - first
+    for line in range(top - bottom):
+        for place in range(span + 2 * FAR_CELLS):
+            columns[line, place] = _BEYOND
     run = columns[columns.shape[0] - 1]
-    run[: span + 2 * FAR_CELLS] = FAR_CELLS
-    for row in range(max(bottom - FAR_CELLS, 0), top):
-        marks = memory.marks[slot.map_offset + row * width : slot.map_offset + (row + 1) * width]
-        for column in range(first, last):
-            place = column + shift
-            run[place] = 0 if marks[column] else min(run[place] + 1, FAR_CELLS)
-        if row >= bottom:
-            for place in range(first + shift, last + shift):
-                columns[row - bottom, place] = run[place] * run[place]
-    run[: span + 2 * FAR_CELLS] = FAR_CELLS
-    for row in range(min(top + FAR_CELLS, height) - 1, bottom - 1, -1):
-        marks = memory.marks[slot.map_offset + row * width : slot.map_offset + (row + 1) * width]
-        for column in range(first, last):
-            place = column + shift
-            run[place] = 0 if marks[column] else min(run[place] + 1, FAR_CELLS)
-        if row < top:
-            line = columns[row - bottom]
-            for place in range(first + shift, last + shift):
-                line[place] = min(line[place], run[place] * run[place])
+    for upwards in (True, False):
+        for place in range(reached):
+            run[place] = FAR_CELLS
+        begin = max(bottom - FAR_CELLS, 0) if upwards else min(top + FAR_CELLS, height) - 1
+        end = top if upwards else bottom - 1
+        for row in range(begin, end, 1 if upwards else -1):
+            start = slot.map_offset + row * width
+            _lengthen(run[:reached], memory.marks[start + first : start + last])
+            if bottom <= row < top:
+                _keep_least_square(columns[row - bottom, into : into + reached], run[:reached])
     for row in range(bottom, top):
         start = slot.map_offset + row * width + left
-        _lower_envelope(memory.distances[start : start + span], columns[row - bottom], run[:span])
+        _lower_envelope(memory.distances[start : start + span], columns[row - bottom], run)
     forget_changes(slot)
 
 
+# The arithmetic below stays in 16 bits: numba would widen it to 64 and lose most vector lanes.
+
+
 @compiled
-def _lower_envelope(distances: ByteArray, line: np.ndarray, best: np.ndarray) -> None:  # type: ignore[type-arg]  # int16 rows; numba specialises by itself
+def _lengthen(run: Int16Array, marks: ByteArray) -> None:
+    """Count one more cell since the last mark, in every column."""
+    for place in range(run.shape[0]):
+        longer = min(np.int16(run[place] + 1), _FAR_16)
+        run[place] = longer if marks[place] == 0 else np.int16(0)
+
+
+@compiled
+def _keep_least_square(line: Int16Array, run: Int16Array) -> None:
+    for place in range(run.shape[0]):
+        line[place] = min(line[place], np.int16(run[place] * run[place]))
+
+
+@compiled
+def _lower_envelope(distances: ByteArray, line: Int16Array, best: Int16Array) -> None:
     """Combine squared distances along columns over the 31 columns around each cell."""
     span = distances.shape[0]
     for cell in range(span):
         best[cell] = line[cell + FAR_CELLS]
     for away in range(1, FAR_CELLS):
         squared = np.int16(away * away)
-        before, after = line[FAR_CELLS - away :], line[FAR_CELLS + away :]
+        before = line[FAR_CELLS - away : FAR_CELLS - away + span]
+        after = line[FAR_CELLS + away : FAR_CELLS + away + span]
         for cell in range(span):
-            best[cell] = min(best[cell], min(before[cell], after[cell]) + squared)
+            nearer = np.int16(min(before[cell], after[cell]) + squared)
+            best[cell] = min(best[cell], nearer)
     for cell in range(span):
-        distances[cell] = min(best[cell], FAR)
+        distances[cell] = min(best[cell], _FAR_SQUARED)
 
 
 @compiled

@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 
+from ses_core.arrays import ByteArray, Float32Array
 from ses_core.compilation import compiled
 from ses_core.planning.costmap import (
     INSCRIBED,
     RESOLUTION_M,
+    WINDOW_CELLS,
     WINDOW_SIZE,
     is_inside,
     window_place,
@@ -17,6 +19,8 @@ from ses_core.simulation.state import Int32Array, Memory, Scratch, Slot, UInt16A
 
 UNREACHED = np.uint16(65535)
 BLOCKED = np.uint16(65534)
+_DETOUR_CELLS = 20
+
 IMPOSSIBLE = 65534
 """From this value on, no way leads there."""
 
@@ -25,42 +29,56 @@ IMPOSSIBLE = 65534
 def measure_distances(
     slot: Slot, memory: Memory, number: int, robot: RobotModel, scratch: Scratch, worker: int
 ) -> None:
-    """Count the steps (4 neighbours) from every window cell to the plan and to its last point.
+    """Count the steps (4 neighbours) from window cells to the plan and to its last point.
 
     Cells with inscribed cost block the way, except under the robot itself. The plan counts up to
-    where it leaves the window; its last point there is the local goal.
+    where it leaves the window; its last point there is the local goal. The original counts over
+    the whole window. Here the search for the plan stays in the box that roll-outs can reach,
+    and the one for the goal ends once it is farther than that box's corners behind the robot:
+    what they leave out, only samples that turn their back on plan and goal could ask for.
     """
     path, goal = memory.path_steps[number], memory.goal_steps[number]
-    costs, distances = memory.costs[number], memory.window_distances[number]
-    for row in range(WINDOW_SIZE):
-        for column in range(WINDOW_SIZE):
-            is_blocked = costs[distances[row, column]] >= INSCRIBED
-            path[row, column] = BLOCKED if is_blocked else UNREACHED
-    _open_footprint(slot, path, robot)
-    path[0, :], path[WINDOW_SIZE - 1, :] = BLOCKED, BLOCKED
-    path[:, 0], path[:, WINDOW_SIZE - 1] = BLOCKED, BLOCKED
-    goal[:] = path
-    queue = scratch.queue[worker]
-    plan = memory.plans[number]
-    size = 0
-    last = -1
+    queue, plan = scratch.queue[worker], memory.plans[number]
+    box = min(int(slot.rollout_reach / RESOLUTION_M) + 1, WINDOW_CELLS // 2)
+    middle = WINDOW_CELLS // 2 + 1  # the robot's cell when the window was centred
+    low, high = max(middle - box, 1), min(middle + box, WINDOW_CELLS)
+    _open_cells(memory.costs[number], memory.window_distances[number], goal)
+    _open_footprint(slot, goal, robot)
+    path[:] = BLOCKED
+    path[low : high + 1, low : high + 1] = goal[low : high + 1, low : high + 1]
+    size, last = 0, -1
     steps = path.ravel()
     for k in range(slot.plan_size):
         column = int(plan[k, 0]) - slot.window_column + 1
         row = int(plan[k, 1]) - slot.window_row + 1
-        if not (1 <= column < WINDOW_SIZE - 1 and 1 <= row < WINDOW_SIZE - 1):
+        if not (1 <= column <= WINDOW_CELLS and 1 <= row <= WINDOW_CELLS):
             break
         last = row * WINDOW_SIZE + column
-        if steps[last] != 0:
+        if low <= column <= high and low <= row <= high and steps[last] != 0:
             steps[last] = 0
             queue[size] = last
             size += 1
-    _spread(steps, queue, size)
+    _spread(steps, queue, size, -1, 0)
     if last >= 0:
         steps = goal.ravel()
         steps[last] = 0
         queue[0] = last
-        _spread(steps, queue, 1)
+        _spread(steps, queue, 1, middle * WINDOW_SIZE + middle, 2 * box + _DETOUR_CELLS)
+
+
+@compiled
+def _open_cells(costs: Float32Array, distances: ByteArray, steps: UInt16Array) -> None:
+    """Prepare a search: bar cells of inscribed cost or more, and the window's border."""
+    bars = np.empty(256, dtype=np.uint16)
+    for squared in range(256):
+        bars[squared] = BLOCKED if costs[squared] >= INSCRIBED else UNREACHED
+    for row in range(WINDOW_SIZE):
+        for column in range(WINDOW_SIZE):
+            steps[row, column] = bars[distances[row, column]]
+    steps[0, :] = BLOCKED
+    steps[WINDOW_SIZE - 1, :] = BLOCKED
+    steps[:, 0] = BLOCKED
+    steps[:, WINDOW_SIZE - 1] = BLOCKED
 
 
 @compiled
@@ -82,13 +100,19 @@ def _open_footprint(slot: Slot, steps: UInt16Array, robot: RobotModel) -> None:
 
 
 @compiled
-def _spread(steps: UInt16Array, queue: Int32Array, size: int) -> None:
-    """Search breadth first from the queued cells; `steps` is flat, with a blocked border."""
+def _spread(steps: UInt16Array, queue: Int32Array, size: int, robot: int, beyond: int) -> None:
+    """Search breadth first from the queued cells; `steps` is flat, with a blocked border.
+
+    Args:
+        robot: End so many steps `beyond` this cell, or never (-1).
+    """
     head = 0
     while head < size:
         cell = queue[head]
         head += 1
-        following = steps[cell] + np.uint16(1)
+        following = np.uint16(steps[cell] + 1)
+        if robot >= 0 and steps[robot] < BLOCKED and following > steps[robot] + beyond:
+            return
         for neighbour in (cell - 1, cell + 1, cell - WINDOW_SIZE, cell + WINDOW_SIZE):
             if steps[neighbour] == UNREACHED:
                 steps[neighbour] = following

@@ -8,7 +8,8 @@ Simplified, and why:
   acceleration limits, which inside a dynamic window takes one of its steps.
 - Roll-outs step 0.05 m of the farthest body point (the original 0.02 m or 0.02 rad) and test
   points of the padded outline 0.165 m apart (the original each cell on it); coarser lets
-  contacts happen that the stack avoids, finer changes nothing.
+  contacts happen that the stack avoids, finer changes nothing. A pose within
+  the footprint's reach of the local costmap's rim counts as off the map.
 - Samples are tried in the order of their cost at the end point, and given up once their cost is
   known to exceed the best. That decides how soon the best is found, not which one it is.
 """
@@ -28,6 +29,7 @@ MIN_VEL_X = 0.1
 MIN_IN_PLACE_VEL_THETA = 0.314
 ESCAPE_VEL = -0.5
 SIM_TIME_S = 2.0
+ESCAPE_REACH_M = -ESCAPE_VEL * SIM_TIME_S
 OCCDIST_SCALE = 0.1
 HEADING_LOOKAHEAD_M = 0.325
 OSCILLATION_RESET_M = 0.05
@@ -82,7 +84,6 @@ def find_command(
     vx_count = min(max(int(parameters[_VX_SAMPLES] + 0.5), 2), MAX_VX_SAMPLES)
     vtheta_count = min(max(int(parameters[_VTHETA_SAMPLES] + 0.5), 2), MAX_VTHETA_SAMPLES)
     last = slot.plan_size - 1
-    end_x, end_y = window_place(slot, slot.x, slot.y)
     away_x = slot.map_x + memory.plans[number, last, 0] * RESOLUTION_M - slot.x
     away_y = slot.map_y + memory.plans[number, last, 1] * RESOLUTION_M - slot.y
     highest = min(parameters[_MAX_VEL_X], math.hypot(away_x, away_y) / SIM_TIME_S)
@@ -236,6 +237,7 @@ def rollout_cost(
     is_straight = abs(w) < 1e-6
     radius = 0.0 if is_straight else v / w / RESOLUTION_M
     stride = v * SIM_TIME_S / steps / RESOLUTION_M
+    harmless = _harmless_distance(slot, robot)
     worst = 0.0
     for k in range(steps + 1):
         step = steps - k if is_backwards else k
@@ -244,7 +246,7 @@ def rollout_cost(
         else:
             x = centre_x + radius * (sine - first_sine)
             y = centre_y - radius * (cosine - first_cosine)
-        cost = _pose_cost(distances, costs, robot, x, y, cosine, sine)
+        cost = _pose_cost(distances, costs, robot, x, y, cosine, sine, harmless)
         if cost < 0.0:
             return HITS
         if path[int(y), int(x)] >= IMPOSSIBLE or goal[int(y), int(x)] >= IMPOSSIBLE:
@@ -260,6 +262,14 @@ def rollout_cost(
 
 
 @compiled
+def _harmless_distance(slot: Slot, robot: RobotModel) -> int:
+    """Give the squared distance [cells^2] of the centre from which no outline cell has a cost."""
+    inflated = max(slot.inflation_radius, 0.0) + robot.circumscribed_radius
+    # Both the centre and the outline point may lie anywhere in their cells.
+    return int(math.ceil((inflated / RESOLUTION_M + math.sqrt(2.0)) ** 2))
+
+
+@compiled
 def _pose_cost(
     distances: ByteArray,
     costs: Float32Array,
@@ -268,23 +278,19 @@ def _pose_cost(
     y: float,
     cosine: float,
     sine: float,
+    harmless: int,
 ) -> float:
     """Give the highest cost under the outline and the centre at a pose [cells], or HITS."""
-    if not (1.0 <= x < WINDOW_SIZE - 1.0 and 1.0 <= y < WINDOW_SIZE - 1.0):
+    rim = robot.circumscribed_radius / RESOLUTION_M + 1.0
+    if not (rim <= x < WINDOW_SIZE - rim and rim <= y < WINDOW_SIZE - rim):
         return HITS
-    centre = int(distances[int(y), int(x)])
-    # Outline cells are at most this much nearer to an obstacle than the centre's cell.
-    slack = robot.circumscribed_radius / RESOLUTION_M + math.sqrt(2.0)
-    nearest = max(0.0, math.sqrt(float(centre)) - slack)
-    if costs[int(nearest * nearest)] == 0.0:
+    least = int(distances[int(y), int(x)])
+    if least >= harmless:
         return 0.0
-    least = centre
     cosine, sine = cosine / RESOLUTION_M, sine / RESOLUTION_M
     for k in range(robot.outline.shape[0]):
         point_x = x + cosine * robot.outline[k, 0] - sine * robot.outline[k, 1]
         point_y = y + sine * robot.outline[k, 0] + cosine * robot.outline[k, 1]
-        if not (0.0 <= point_x < WINDOW_SIZE and 0.0 <= point_y < WINDOW_SIZE):
-            return HITS
         squared = int(distances[int(point_y), int(point_x)])
         if squared == 0:
             return HITS

@@ -105,16 +105,19 @@ def cast_scan(
     x: float,
     y: float,
     yaw: float,
-    beam_angles: FloatArray,
+    beams: FloatArray,
     range_min: float,
     range_max: float,
 ) -> None:
     """Fill one noiseless scan (B,) [m] from a laser at (x, y, yaw) in the grid's frame [m, rad].
 
     Readings outside [range_min, range_max] become inf, as where nothing was hit.
+
+    Args:
+        beams: (B, 2) unit vectors in the laser's frame.
     """
-    for beam in range(beam_angles.shape[0]):
-        angle = yaw + beam_angles[beam]
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    for beam in range(beams.shape[0]):
         distance = resolution * cast(
             clearance,
             offset,
@@ -122,8 +125,8 @@ def cast_scan(
             height,
             x / resolution,
             y / resolution,
-            math.cos(angle),
-            math.sin(angle),
+            cosine * beams[beam, 0] - sine * beams[beam, 1],
+            sine * beams[beam, 0] + cosine * beams[beam, 1],
             range_max / resolution,
         )
         ranges[beam] = distance if range_min <= distance <= range_max else np.inf

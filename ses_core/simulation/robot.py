@@ -30,7 +30,7 @@ class RobotModel(NamedTuple):
     max_turn_rate: float
     acceleration: float
     turn_acceleration: float
-    beam_angles: FloatArray  # (B,) in the laser's frame [rad]
+    beams: FloatArray  # (B, 2) unit vectors in the laser's frame
     mount_x: float
     mount_y: float
     mount_yaw: float
@@ -60,13 +60,20 @@ def robot_model(profile: RobotProfile) -> RobotModel:
         max_turn_rate=profile.max_turn_rate_radps,
         acceleration=profile.acc_lim_x_mps2,
         turn_acceleration=profile.acc_lim_theta_radps2,
-        beam_angles=np.linspace(laser.angle_min_rad, laser.angle_max_rad, laser.beams),
+        beams=beam_directions(profile),
         mount_x=laser.mount_x_m,
         mount_y=laser.mount_y_m,
         mount_yaw=laser.mount_yaw_rad,
         range_min=laser.range_min_m,
         range_max=laser.range_max_m,
     )
+
+
+def beam_directions(profile: RobotProfile) -> FloatArray:
+    """Give the beams (B, 2) as unit vectors in the laser's frame."""
+    laser = profile.laser
+    angles = np.linspace(laser.angle_min_rad, laser.angle_max_rad, laser.beams)
+    return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def _counter_clockwise(corners: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ses_core.arrays import ByteArray, Float32Array, FloatArray, IntArray
 
+Int16Array = NDArray[np.int16]
 Int32Array = NDArray[np.int32]
 UInt16Array = NDArray[np.uint16]
 
@@ -66,6 +67,7 @@ class Slot(Protocol):
     local_goal_x: float
     local_goal_y: float
     inflation_radius: float
+    rollout_reach: float  # farthest a sample can get until the next scan [m]
 
     # The local planner.
     window_column: int  # map cell at the window's lower left corner
@@ -110,7 +112,7 @@ class Scratch(NamedTuple):
     """Working arrays of one thread each (leading axis); nothing in them outlives a call."""
 
     queue: Int32Array  # (T, W * W) cells of a breadth-first search
-    columns: NDArray[np.int16]  # (T, H, W) squared distances along columns
+    columns: Int16Array  # (T, H, W) squared distances along columns
     waves: Int32Array  # (T, 3, largest map) cells of the global planner's three wave fronts
     is_pending: ByteArray  # (T, largest map)
     samples: FloatArray  # (T, S) cost of the local planner's samples

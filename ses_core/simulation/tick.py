@@ -21,7 +21,13 @@ from ses_core.planning.costmap import (
 from ses_core.planning.distance_maps import measure_distances
 from ses_core.planning.global_planner import update_plan
 from ses_core.planning.recovery import recover
-from ses_core.planning.trajectory_planner import find_command
+from ses_core.planning.trajectory_planner import (
+    ESCAPE_REACH_M,
+    HEADING_LOOKAHEAD_M,
+    MIN_VEL_X,
+    SIM_TIME_S,
+    find_command,
+)
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.lidar import cast_scan
 from ses_core.simulation.noise import draw_normal, draw_uniform
@@ -34,7 +40,7 @@ _COLLISION = int(EpisodeOutcome.COLLISION)
 _TIMEOUT = int(EpisodeOutcome.TIMEOUT)
 _STUCK = int(EpisodeOutcome.STUCK)
 
-_INFLATION_RADIUS = 6  # place among the parameters
+_MAX_VEL_X, _INFLATION_RADIUS = 0, 6  # places among the parameters
 _MOTION_STEP_M = 0.02  # the body is tested for contact at least this often on its way
 _PLAN_AGE_S = 2.0  # the global planner's potential is computed anew after this at the latest
 
@@ -112,7 +118,7 @@ def sense(
         slot.x + cosine * robot.mount_x - sine * robot.mount_y - slot.world_x,
         slot.y + sine * robot.mount_x + cosine * robot.mount_y - slot.world_y,
         slot.yaw + robot.mount_yaw,
-        robot.beam_angles,
+        robot.beams,
         robot.range_min,
         robot.range_max,
     )
@@ -124,7 +130,9 @@ def sense(
         for beam in range(ranges.shape[0]):
             if draw_uniform(slot) < setup.range_dropout:
                 ranges[beam] = np.inf
-    work_in_scan(slot, memory, ranges, robot, setup.clears_footprint)
+    work_in_scan(
+        slot, memory, ranges, robot, scratch.queue[worker], clears_footprint=setup.clears_footprint
+    )
     refresh_distances(slot, memory, scratch, worker)
     update_plan(slot, memory, number, robot, scratch, worker, setup.plan_age)
     centre_window(slot, memory, number)
@@ -143,11 +151,19 @@ def plan(
     worker: int,
 ) -> None:
     """Set the slot's command for this tick and send it on its way to the wheels."""
-    if parameters[_INFLATION_RADIUS] != slot.inflation_radius:
+    has_news = parameters[_INFLATION_RADIUS] != slot.inflation_radius
+    if has_news:
         slot.inflation_radius = parameters[_INFLATION_RADIUS]
         inflation_costs(memory.costs[number], slot.inflation_radius, robot.inscribed_radius)
         slot.search_needed = True
         update_plan(slot, memory, number, robot, scratch, worker, setup.plan_age)
+    farthest = max(parameters[_MAX_VEL_X], MIN_VEL_X) * (
+        SIM_TIME_S + setup.sense_every * setup.period
+    )
+    # In front of the robot there is also the place where turning in place looks ahead.
+    reach = max(farthest, ESCAPE_REACH_M) + HEADING_LOOKAHEAD_M
+    if has_news or reach != slot.rollout_reach:
+        slot.rollout_reach = reach
         measure_distances(slot, memory, number, robot, scratch, worker)
     if not recover(slot, memory, number, robot, setup.period):
         is_valid = slot.has_plan and find_command(
@@ -272,7 +288,7 @@ def run_share(
         if phase != SENSE and slot.outcome == _RUNNING:
             rounds = ticks
         for _ in range(rounds):
-            if phase == PLAN or phase == ADVANCE:
+            if phase in (PLAN, ADVANCE):
                 plan(slot, memory, number, robot, setup, parameters[number], scratch, worker)
             if phase == PLAN:
                 v, w = wheel_command(slot, memory, number)
@@ -281,7 +297,7 @@ def run_share(
                 move(slot, memory, number, robot, setup)
             if phase == SETTLE:
                 _take_over(slot, setup, outside, number)
-            if phase == ADVANCE or phase == SETTLE:
+            if phase in (ADVANCE, SETTLE):
                 is_due = slot.tick % setup.sense_every == 0
             if is_due:
                 sense(slot, memory, number, robot, setup, scratch, worker)
