@@ -1,15 +1,31 @@
 """`NightSummary`: what a night did, as `ses nightly --json` prints it and the UI shows it."""
 
 from datetime import date
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-STAGES = ("ingest", "extract", "filter", "synthesize", "render", "train", "evaluate", "report")
+StageName = Literal[
+    "ingest", "extract", "filter", "synthesize", "render", "train", "evaluate", "report"
+]
+
+STAGES: tuple[StageName, ...] = (
+    "ingest",
+    "extract",
+    "filter",
+    "synthesize",
+    "render",
+    "train",
+    "evaluate",
+    "report",
+)
 """The stages in order, as `--refresh` names them."""
+
+Interval = tuple[float, float]
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="ignore", from_attributes=True)
 
 
 class StageCount(_Part):
@@ -32,11 +48,11 @@ class LogCounts(_Part):
 
 
 class EvaluationRow(_Part):
-    """One policy's trials on the held-out worlds."""
+    """One policy's trials on the held-out worlds; no interval from fewer than two worlds."""
 
     policy: str
     success_rate: float
-    success_ci: tuple[float, float]
+    success_ci: Interval | None
     mean_time_s: float | None
     restricted_mean_time_s: float
     collision_rate: float
@@ -44,46 +60,53 @@ class EvaluationRow(_Part):
     stuck_rate: float
     barn_score: float
     trials: int
+    worlds: int
 
 
-class Comparison(_Part):
+class ComparisonRow(_Part):
     """The new policy against another one, on the same worlds, pairs and seeds."""
 
     policy: str
     baseline: str
     success_difference: float
-    ci: tuple[float, float]
+    ci: Interval | None
     time_difference_s: float
-    ci_s: tuple[float, float]
+    ci_s: Interval | None
 
 
 class NightSummary(_Part):
     """One nightly batch; keys are public (see the README)."""
 
-    run_id: str
+    run_id: str = ""
     batch_date: date
     logs: LogCounts = LogCounts()
     scenarios: int = 0
     challenging: int = 0
+    count_kind: str = ""
     challenging_by_count: dict[str, int] = Field(
-        default_factory=dict,
-        description="Challenging scenarios under each count, at the threshold.",
+        default_factory=dict, description="Challenging scenarios by the kind of count."
     )
     environments: int = 0
     stages: dict[str, StageCount] = Field(
-        default_factory=lambda: {stage: StageCount() for stage in STAGES}
+        default_factory=lambda: {str(stage): StageCount() for stage in STAGES}
     )
     evaluation: list[EvaluationRow] = Field(default_factory=list)
-    comparisons: list[Comparison] = Field(default_factory=list)
+    comparisons: list[ComparisonRow] = Field(default_factory=list)
     decision: str = "nothing-new"
     reason: str = ""
     champion: str | None = None
     policy: str | None = None
+    decisions_trained: int = 0
     report: str | None = None
 
-    def count(self, stage: str, *, found: bool, seconds: float) -> None:
+    def count(self, stage: StageName, *, found: bool, seconds: float) -> None:
         """Add one task's outcome to its stage."""
         counts = self.stages[stage]
         counts.found += found
         counts.built += not found
         counts.seconds = round(counts.seconds + seconds, 3)
+
+
+def stages_from(refresh: StageName | None) -> frozenset[StageName]:
+    """List a stage and all after it: those that are built anew; none for None."""
+    return frozenset() if refresh is None else frozenset(STAGES[STAGES.index(refresh) :])

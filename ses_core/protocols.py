@@ -159,6 +159,10 @@ class ArtifactStore(Protocol):
         """Build into an empty folder, then commit it as the answer to a recipe."""
         ...
 
+    def forget(self, recipe: Recipe) -> None:
+        """Drop the answer to a recipe, so that it is built again; its artifact stays."""
+        ...
+
     def path(self, ref: ArtifactRef) -> Path:
         """Give the folder of an artifact, checked against its digest.
 

@@ -24,14 +24,22 @@ class Materialized:
 
 
 def materialize(
-    store: ArtifactStore, recipe: Recipe, build: Callable[[Path], None]
+    store: ArtifactStore, recipe: Recipe, build: Callable[[Path], None], *, anew: bool = False
 ) -> Materialized:
     """Give the artifact that a recipe asks for, building it only where it is not there.
+
+    Args:
+        store: Where it is kept.
+        recipe: What is asked for.
+        build: Builds it into an empty folder.
+        anew: Build it although it is there.
 
     Raises:
         ArtifactError: The disk is full or failing. Errors of `build` pass through.
     """
     started = time.perf_counter()
+    if anew:
+        store.forget(recipe)
     found = store.find(recipe)
     ref = found if found is not None else store.put(recipe, build)
     return Materialized(

@@ -29,6 +29,23 @@ from tasks.outcome import conclude
 from tasks.progress import report_progress
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeldoutWorlds:
+    """Where the worlds come from that policies are measured on.
+
+    Attributes:
+        selection: A selection, whose held-out places are crossed; or
+        paths: Files and folders of worlds, in which pairs are drawn.
+        part: Only this part of a folder, by its `split.csv`.
+        resolution: Of images that carry none [m per pixel].
+    """
+
+    selection: ArtifactRef | None = None
+    paths: tuple[Path, ...] = ()
+    part: str | None = None
+    resolution: float | None = None
+
+
 def crossing_places(domain: NavigationDomain, profile: RobotProfile) -> list[EvaluationTask]:
     """Make one pair of each environment: across it, from the bottom to the top."""
     return [
@@ -60,6 +77,18 @@ def sampled_places(
     return places
 
 
+def heldout_digest(source: HeldoutWorlds) -> str:
+    """Digest the worlds of some paths; empty where the night holds out places itself.
+
+    Raises:
+        WorldError: A path holds no worlds.
+    """
+    if not source.paths:
+        return ""
+    worlds = read_worlds(source.paths, part=source.part, resolution=source.resolution)
+    return digest_json([[world.world_id, content_digest(world.grid)] for world in worlds])
+
+
 def refuse_known_worlds(
     places: Sequence[EvaluationTask], trained_in: Sequence[NavigationTask]
 ) -> None:
@@ -75,23 +104,6 @@ def refuse_known_worlds(
                 f"held-out world {place.world_id} is also a training world, expected a world "
                 "that no policy has seen"
             )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HeldoutWorlds:
-    """Where the worlds come from that policies are measured on.
-
-    Attributes:
-        selection: A selection, whose held-out places are crossed; or
-        paths: Files and folders of worlds, in which pairs are drawn.
-        part: Only this part of a folder, by its `split.csv`.
-        resolution: Of images that carry none [m per pixel].
-    """
-
-    selection: ArtifactRef | None = None
-    paths: tuple[Path, ...] = ()
-    part: str | None = None
-    resolution: float | None = None
 
 
 def heldout_places(
@@ -122,6 +134,7 @@ def evaluate_policies(
     most_places: int | None = None,
     store: LocalArtifactStore,
     settings: Settings,
+    anew: bool = False,
 ) -> Materialized:
     """Drive every policy through the same trials, and keep every episode.
 
@@ -134,6 +147,7 @@ def evaluate_policies(
         most_places: Only the first so many pairs.
         store: Where the episodes go.
         settings: Evaluation, simulation and target robot.
+        anew: Drive although it was done before.
 
     Raises:
         SesError: A held-out world is one of the training worlds.
@@ -165,7 +179,7 @@ def evaluate_policies(
         )
         write_evaluation(directory, episodes)
 
-    return conclude(materialize(store, Recipe(EVALUATE, asked), build))
+    return conclude(materialize(store, Recipe(EVALUATE, asked), build, anew=anew))
 
 
 def _place_key(place: EvaluationTask) -> list[JsonValue]:

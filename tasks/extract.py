@@ -69,7 +69,7 @@ def look_for_scenarios(
 
 @task(name="extract scenarios", task_run_name="extract log {log.log_id:.12}", cache_policy=NO_CACHE)
 def extract_scenarios(
-    log: CatalogueEntry, *, store: LocalArtifactStore, settings: Settings
+    log: CatalogueEntry, *, store: LocalArtifactStore, settings: Settings, anew: bool = False
 ) -> Materialized:
     """Cut one log's trajectories into scenarios and rebuild each one's place."""
     site_maps = read_site_maps(settings.extraction.site_maps)
@@ -97,7 +97,7 @@ def extract_scenarios(
             filter_settings=settings.filter,
         )
 
-    made = materialize(store, extraction_recipe(log, settings, site_maps), build)
+    made = materialize(store, extraction_recipe(log, settings, site_maps), build, anew=anew)
     parts = artifact_parts(store, made.ref, name=log.log_id, batch_date=log.batch_date)
     TableLog(store.layout).commit(parts, message=f"scenarios of log {log.log_id}")
     return conclude(made)

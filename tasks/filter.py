@@ -25,6 +25,7 @@ def select_scenarios(
     last_batch: date,
     store: LocalArtifactStore,
     settings: FilterSettings,
+    anew: bool = False,
 ) -> Materialized:
     """Choose the pool that is synthesized from and the places that are held out."""
     recipe = Recipe(
@@ -46,4 +47,4 @@ def select_scenarios(
         )
         write_selection(directory, selection, environments)
 
-    return conclude(materialize(store, recipe, build))
+    return conclude(materialize(store, recipe, build, anew=anew))

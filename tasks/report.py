@@ -12,7 +12,6 @@ from storage.materialize import Materialized, materialize
 from storage.night_artifacts import NightArtifacts
 from storage.night_contents import gather_night
 from storage.night_tables import write_night_tables
-from storage.report_page import write_report
 from storage.stages import REPORT
 from storage.table_log import TableLog
 from storage.table_parts import artifact_parts
@@ -22,14 +21,19 @@ PAGE = "index.html"
 
 
 @task(name="write the report", cache_policy=NO_CACHE)
-def report_night(night: NightArtifacts, *, store: LocalArtifactStore) -> Materialized:
+def report_night(
+    night: NightArtifacts, *, store: LocalArtifactStore, anew: bool = False
+) -> Materialized:
     """Add the night to the tables, and put its page where people look for it."""
 
     def build(directory: Path) -> None:
+        # matplotlib takes half a second to import: only who draws pays for it.
+        from storage.report_page import write_report
+
         write_night_tables(directory, night, store=store)
         write_report(directory / PAGE, gather_night(night, store=store))
 
-    made = materialize(store, Recipe(REPORT, night.key()), build)
+    made = materialize(store, Recipe(REPORT, night.key()), build, anew=anew)
     if night.selection is not None:
         parts = artifact_parts(store, made.ref, name=night.run_id, batch_date=night.batch_date)
         TableLog(store.layout).commit(parts, message=f"night {night.run_id}")

@@ -26,7 +26,11 @@ from tasks.progress import report_progress
 
 @task(name="fit the synthesizer", cache_policy=NO_CACHE)
 def fit_synthesizer(
-    selection: ArtifactRef, *, store: LocalArtifactStore, settings: SynthesisSettings
+    selection: ArtifactRef,
+    *,
+    store: LocalArtifactStore,
+    settings: SynthesisSettings,
+    anew: bool = False,
 ) -> Materialized:
     """Learn what the challenging environments look like; anew only when their set changed."""
     pool = read_selection(store.path(selection)).pool_environments
@@ -47,7 +51,7 @@ def fit_synthesizer(
             directory, fit_synthesis(pool, settings=settings, rng=rng, progress=progress)
         )
 
-    return conclude(materialize(store, recipe, build))
+    return conclude(materialize(store, recipe, build, anew=anew))
 
 
 @task(name="sample environments", cache_policy=NO_CACHE)
@@ -58,6 +62,7 @@ def sample_environments(
     store: LocalArtifactStore,
     settings: SynthesisSettings,
     target: RobotProfile,
+    anew: bool = False,
 ) -> Materialized:
     """Draw environments until enough of them can be crossed by the target robot."""
     pool = read_selection(store.path(selection)).pool_environments
@@ -93,4 +98,4 @@ def sample_environments(
         )
         write_record(directory / SYNTHESIS_FILE, asdict(used))
 
-    return conclude(materialize(store, recipe, build))
+    return conclude(materialize(store, recipe, build, anew=anew))

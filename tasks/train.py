@@ -37,6 +37,7 @@ def train_policy(
     store: LocalArtifactStore,
     settings: Settings,
     deadline_stamp_s: float | None = None,
+    anew: bool = False,
 ) -> Materialized:
     """Go on from the parent in the synthesized environments, and bundle what was learned.
 
@@ -47,6 +48,7 @@ def train_policy(
         store: Where the bundle goes.
         settings: Training, simulation and target robot.
         deadline_stamp_s: Unix time at which training stops where it is [s].
+        anew: Train although it was done before.
     """
     source = find_policy(parent, store.layout)
     asked: dict[str, JsonValue] = {
@@ -71,7 +73,9 @@ def train_policy(
             deadline=stop_at(deadline_stamp_s),
         )
 
-    return conclude(materialize(store, Recipe(TRAIN, asked, inputs=(environments,)), build))
+    return conclude(
+        materialize(store, Recipe(TRAIN, asked, inputs=(environments,)), build, anew=anew)
+    )
 
 
 def save_training(
