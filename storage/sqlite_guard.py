@@ -35,7 +35,7 @@ def recover_wal(database: Path) -> bool:
     try:
         with closing(sqlite3.connect(database)) as connection:
             connection.execute("PRAGMA trusted_schema=OFF")
-            connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            # Leaving the mode moves everything committed into the database and drops the log.
             connection.execute("PRAGMA journal_mode=DELETE")
     except sqlite3.Error as error:
         raise LogError("truncated", f"write-ahead log cannot be recovered: {error}") from error

@@ -160,7 +160,7 @@ def test_messages_that_arrive_in_a_burst_are_no_jump() -> None:
 
 
 def test_without_a_clock_every_pose_is_one_step_of_unknown_speed() -> None:
-    seconds = np.arange(10) * 0.05
+    seconds = np.arange(0.0, 0.5, 0.05)
     log = recording(seconds, straight(seconds), has_clock=False)
     (trajectory,) = resample(log, profile=GENERIC, settings=SETTINGS)
     np.testing.assert_array_equal(trajectory.poses, log.poses.poses)
