@@ -11,7 +11,7 @@ from ses_core.compilation import compiled
 from ses_core.extraction.scenario import Scenario
 from ses_core.occupancy import ENVIRONMENT_RESOLUTION_M, ENVIRONMENT_SIDE_M, environment_course
 from ses_core.settings import FilterSettings
-from ses_core.synthesis.traversability import NODES_PER_CELL, node_clearance, shortest_path
+from ses_core.synthesis.traversability import NODES_PER_CELL, node_clearance, path_through
 
 CountKind = Literal["negative", "not-forward", "reversing-seconds"]
 
@@ -67,12 +67,13 @@ def is_challenging(scenario: Scenario, settings: FilterSettings) -> bool:
 
 def measure_difficulty(cells: BoolArray, *, radius: float) -> DifficultyMeasures | None:
     """Measure an environment (30, 30) for a disc of a radius [m]; None where it cannot cross."""
-    path = shortest_path(cells, radius)
+    course = environment_course(cells, apron=OPEN_END_M)
+    clearance = node_clearance(course)
+    path = path_through(course, clearance, radius)
     if path is None:
         return None
-    course = environment_course(cells, apron=OPEN_END_M)
     spacing = course.resolution / NODES_PER_CELL
-    clearance = node_clearance(course) - radius
+    clearance -= radius
     nodes = np.rint((path - course.origin) / spacing).astype(np.int64)
     along_path = np.maximum(clearance[nodes[:, 1], nodes[:, 0]], 0.0)
     visibility, characteristic, dispersion = _look_around(

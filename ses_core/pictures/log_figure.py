@@ -69,9 +69,10 @@ def _draw_log(
     """Draw scan points, the paths, a dot where each scenario begins, a number on those shown."""
     style_axes(axes, theme=theme)
     axes.set_aspect("equal")
-    path = np.concatenate([trajectory.poses[:, :2] for trajectory in trajectories])
-    axes.set_xlim(path[:, 0].min() - AROUND_M, path[:, 0].max() + AROUND_M)
-    axes.set_ylim(path[:, 1].min() - AROUND_M, path[:, 1].max() + AROUND_M)
+    path = np.concatenate([np.zeros((0, 2)), *(one.poses[:, :2] for one in trajectories)])
+    if len(path):
+        axes.set_xlim(path[:, 0].min() - AROUND_M, path[:, 0].max() + AROUND_M)
+        axes.set_ylim(path[:, 1].min() - AROUND_M, path[:, 1].max() + AROUND_M)
     axes.set_xlabel("x [m]", fontsize=9)
     axes.set_ylabel("y [m]", fontsize=9)
     most = max(1, MOST_POINTS // max(1, len(trajectories)))

@@ -35,6 +35,8 @@ RADIUS_LIMIT_M = 0.5
 NODES_PER_CELL = 8
 """Nodes of the path lattice along the side of a cell."""
 
+_MOST_PULLS = 20
+
 _EPSILON = 1e-9
 """So that a gap of exactly one diameter can be passed, whatever the rounding."""
 
@@ -122,9 +124,14 @@ def shortest_path(cells: BoolArray, radius: float) -> FloatArray | None:
     Raises:
         ValueError: The radius is out of range.
     """
-    _check_radius(radius)
     course = environment_course(cells)
-    free = node_clearance(course) >= radius - _EPSILON
+    return path_through(course, node_clearance(course), radius)
+
+
+def path_through(course: OccupancyGrid, clearance: FloatArray, radius: float) -> FloatArray | None:
+    """Find the shortest way through a course whose `node_clearance` is known already."""
+    _check_radius(radius)
+    free = clearance >= radius - _EPSILON
     spacing = course.resolution / NODES_PER_CELL
     start = np.rint((np.array([0.0, 0.0]) - course.origin) / spacing).astype(np.int64)
     goal = np.rint((np.array([ENVIRONMENT_SIDE_M, 0.0]) - course.origin) / spacing).astype(np.int64)
@@ -132,7 +139,7 @@ def shortest_path(cells: BoolArray, radius: float) -> FloatArray | None:
     nodes = _walk_back(parents, int(goal[0]), int(goal[1]))
     if len(nodes) == 0:
         return None
-    return np.asarray(course.origin) + _pull_taut(free, nodes) * spacing
+    return np.asarray(course.origin) + _tightened(free, nodes.astype(np.float64)) * spacing
 
 
 def node_clearance(course: OccupancyGrid) -> FloatArray:
@@ -211,33 +218,46 @@ def _walk_back(parents: IntArray, goal_x: int, goal_y: int) -> IntArray:
     return nodes[:count][::-1].copy()
 
 
-@compiled
-def _pull_taut(free: BoolArray, nodes: IntArray) -> FloatArray:
-    """Replace runs of nodes (P, 2) by straight lines wherever the disc fits along them.
+def _tightened(free: BoolArray, path: FloatArray) -> FloatArray:
+    """Pull a path (P, 2) [nodes] taut like a rope, from both ends in turn.
 
-    Eight directions alone make a straight line up to 8 % too long. Points are one node apart.
+    Eight directions alone make a straight line up to 8 % too long.
     """
-    points = [(float(nodes[0, 0]), float(nodes[0, 1]))]
+    length = math.inf
+    for _ in range(_MOST_PULLS):
+        path = _pull_taut(free, path)[::-1].copy()
+        path = _pull_taut(free, path)[::-1].copy()
+        steps = np.diff(path, axis=0)
+        shorter = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+        if shorter > length - 0.1:
+            break
+        length = shorter
+    return path
+
+
+@compiled
+def _pull_taut(free: BoolArray, path: FloatArray) -> FloatArray:
+    """Replace runs of points (P, 2) by straight lines wherever the disc fits along them."""
+    points = [(path[0, 0], path[0, 1])]
     anchor = 0
-    while anchor < nodes.shape[0] - 1:
+    while anchor < path.shape[0] - 1:
         ahead = anchor + 1
-        while ahead + 1 < nodes.shape[0] and _is_clear(free, nodes[anchor], nodes[ahead + 1]):
+        while ahead + 1 < path.shape[0] and _is_clear(free, path[anchor], path[ahead + 1]):
             ahead += 1
-        dx = float(nodes[ahead, 0] - nodes[anchor, 0])
-        dy = float(nodes[ahead, 1] - nodes[anchor, 1])
+        dx, dy = path[ahead, 0] - path[anchor, 0], path[ahead, 1] - path[anchor, 1]
         steps = max(math.ceil(math.hypot(dx, dy)), 1)
         for step in range(1, steps + 1):
             share = step / steps
-            points.append((nodes[anchor, 0] + share * dx, nodes[anchor, 1] + share * dy))
+            points.append((path[anchor, 0] + share * dx, path[anchor, 1] + share * dy))
         anchor = ahead
     return np.array(points)
 
 
 @compiled
-def _is_clear(free: BoolArray, start: IntArray, end: IntArray) -> bool:
-    """Tell whether the nodes nearest to a straight line are all free."""
-    dx, dy = float(end[0] - start[0]), float(end[1] - start[1])
-    steps = max(math.ceil(2.0 * math.hypot(dx, dy)), 1)
+def _is_clear(free: BoolArray, start: FloatArray, end: FloatArray) -> bool:
+    """Tell whether the nodes nearest to a straight line, half a node apart, are all free."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    steps = 2 * max(math.ceil(math.hypot(dx, dy)), 1)
     for step in range(1, steps):
         share = step / steps
         if not free[round(start[1] + share * dy), round(start[0] + share * dx)]:
