@@ -88,6 +88,12 @@ def given(options: Mapping[str, JsonValue]) -> dict[str, JsonValue]:
     return {name: value for name, value in options.items() if value is not None}
 
 
+def answer_facts(command: CommandContext, facts: Mapping[str, JsonValue]) -> None:
+    """Answer with one thing's facts: a JSON object, or a line for each."""
+    lines: list[Row] = [{"what": name, "value": value} for name, value in facts.items()]
+    command.answer(dict(facts), lambda: aligned(lines))
+
+
 def command_context(context: typer.Context) -> CommandContext:
     """Give what the global options said."""
     found = context.find_root().obj

@@ -18,6 +18,7 @@ from flows import (
     serve_commands,
     show_commands,
     store_commands,
+    training_commands,
     world_commands,
 )
 from flows.command_arguments import describe_misuse, hoist_global_options, sentence
@@ -40,6 +41,7 @@ for group in (
     show_commands,
     quarantine_commands,
     world_commands,
+    training_commands,
     policy_commands,
     store_commands,
     serve_commands,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flows.command_context import aligned, command_context
+from flows.command_context import answer_facts, command_context
 from flows.progress_display import ProgressDisplay
 from ses_core.recipes import JsonValue
 
@@ -53,8 +53,7 @@ def show(context: typer.Context, identity: LogArgument) -> None:
 
     command = command_context(context)
     row = _row(Quarantine(command.existing_store().quarantine).find(identity))
-    facts: list[dict[str, JsonValue]] = [{"what": key, "value": row[key]} for key in row]
-    command.answer(row, lambda: aligned(facts))
+    answer_facts(command, row)
 
 
 @quarantine_app.command(epilog="Example: ses quarantine retry 3f9a1c")

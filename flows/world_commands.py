@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from flows.command_arguments import existing_path, misuse
-from flows.command_context import CommandContext, command_context
+from flows.command_context import CommandContext, aligned, answer_facts, command_context, given
+from flows.policy_names import check_policies
 from flows.shared_options import (
     OutOption,
     PartOption,
     ResolutionOption,
+    SeedOption,
+    SimulatorOption,
+    WorldsOption,
 )
 from ses_core.recipes import JsonValue
 
@@ -105,11 +109,50 @@ def show(
     _answer_worlds(command_context(context), found.worlds, passed_over=len(found.passed_over))
 
 
+@app.command(
+    epilog="Example: ses deploy --worlds homes --policy dwa-slow --deployments 40 --out inbox"
+)
+def deploy(
+    context: typer.Context,
+    worlds: WorldsOption,
+    deployments: Annotated[int, typer.Option(metavar="N", min=1, help="Drives to record.")],
+    out: OutOption,
+    policy: Annotated[str, typer.Option(metavar="NAME", help="Who drives.")] = "dwa-slow",
+    log_format: Annotated[
+        Literal["mcap", "db3", "bag", "tables"], typer.Option("--format", help="Of the logs.")
+    ] = "mcap",
+    part: PartOption = None,
+    resolution: ResolutionOption = None,
+    simulator: SimulatorOption = None,
+    seed: SeedOption = None,
+) -> None:
+    """Let a simulated fleet drive for a day and write its logs as <site>/<robot>/."""
+    from flows.prefect_server import embedded_server
+
+    command = command_context(context)
+    settings = command.settings(given({"evaluation.simulator": simulator}))
+    check_policies(command, [policy], "--policy")
+    with embedded_server(command.root):
+        from flows.fleet_deployment import deploy as deploy_flow
+
+        summary = deploy_flow(
+            root=command.root,
+            worlds=tuple(worlds),
+            part=part,
+            resolution=resolution,
+            policy=policy,
+            deployments=deployments,
+            out=out.absolute(),
+            format=log_format,
+            seed=seed or 0,
+            settings=settings,
+        )
+    answer_facts(command, summary.model_dump(mode="json"))
+
+
 def _answer_worlds(
     command: CommandContext, worlds: Sequence["World"], *, passed_over: int = 0
 ) -> None:
-    from flows.command_context import aligned
-
     rows: list[dict[str, JsonValue]] = [
         {
             "world_id": world.world_id,
