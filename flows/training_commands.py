@@ -90,17 +90,20 @@ def pretrain(
 ) -> None:
     """Train the original policy, which nights go on from until there is a champion."""
     command = command_context(context)
-    settings = command.settings(given({"training.steps": steps, "training.seed": seed}))
+    settings = command.settings()
     with embedded_server(command.root):
         from flows.policy_training import pretrain as pretrain_flow
 
         summary = pretrain_flow(
-            root=command.root,
             out=out.absolute(),
+            steps=steps,
+            seed=seed,
             worlds=tuple(worlds or ()),
             part=part,
             resolution=resolution,
-            settings=settings,
+            steps=steps,
+            seed=seed,
+            settings=command.settings(),
         )
     answer_facts(command, summary.model_dump(mode="json"))
 

@@ -106,6 +106,11 @@ def read_selection(directory: Path) -> StoredSelection:
     )
 
 
+def read_pool(directory: Path) -> NavigationDomain:
+    """Read only the environments of the pool, hardest first."""
+    return read_environments(directory / POOL_FOLDER)
+
+
 def domain_digest(domain: NavigationDomain) -> str:
     """Digest which environments a domain holds, in their order."""
     return digest_json([environment.environment_id for environment in domain.environments])

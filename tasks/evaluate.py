@@ -8,7 +8,8 @@ import numpy as np
 from prefect import task
 from prefect.cache_policies import NO_CACHE
 
-from ses_core.errors import SesError
+from ses_core.errors import SesError, WorldError
+from ses_core.evaluation.statistics import summarize
 from ses_core.evaluation.trials import EvaluationTask, evaluate, evaluation_task
 from ses_core.navigation import NavigationDomain, NavigationTask, World, environment_task
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, digest_json, settings_json
@@ -180,6 +181,43 @@ def evaluate_policies(
         write_evaluation(directory, episodes)
 
     return conclude(materialize(store, Recipe(EVALUATE, asked), build, anew=anew))
+
+
+@task(name="evaluate policies by hand", cache_policy=NO_CACHE)
+def evaluate_in_folder(
+    policies: tuple[str, ...],
+    heldout: HeldoutWorlds,
+    *,
+    out: Path,
+    store: LocalArtifactStore,
+    settings: Settings,
+) -> None:
+    """Drive policies through the same trials; write episodes, summary and figures into a folder.
+
+    Raises:
+        WorldError: No world has room for a start and a goal so far apart.
+    """
+    # matplotlib takes half a second to import: only who draws pays for it.
+    from ses_core.pictures.evaluation_figure import draw_evaluation, draw_worlds
+
+    places = heldout_places(heldout, store=store, settings=settings)
+    if not places:
+        raise WorldError(
+            f"no world has two places {settings.evaluation.min_distance_m:g} m apart, expected one"
+        )
+    episodes = evaluate(
+        {name: find_policy(name, store.layout).policy for name in policies},
+        places,
+        trials=settings.evaluation.trials,
+        seed=settings.evaluation.seed,
+        simulation=settings.simulation,
+        profile=settings.target_robot,
+        simulator=settings.evaluation.simulator,
+        progress=report_progress("evaluate"),
+    )
+    write_evaluation(out, episodes)
+    (out / "policies.png").write_bytes(draw_evaluation(summarize(episodes)))
+    (out / "worlds.png").write_bytes(draw_worlds(episodes))
 
 
 def _place_key(place: EvaluationTask) -> list[JsonValue]:

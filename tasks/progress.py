@@ -28,15 +28,16 @@ def report_progress(
     logger = _logger()
     in_run = TaskRunContext.get() is not None or FlowRunContext.get() is not None
     last = clock()
+    has_spoken = False
     artifact: UUID | None = None
 
     def progress(share: float) -> None:
-        nonlocal last, artifact
+        nonlocal last, has_spoken, artifact
         now = clock()
-        is_end = share >= 1.0 and artifact is not None
+        is_end = share >= 1.0 and has_spoken
         if now - last < INTERVAL_S and not is_end:
             return
-        last = now
+        last, has_spoken = now, True
         percent = 100.0 * min(max(share, 0.0), 1.0)
         logger.info("%s %.0f %%", stage, percent, extra={"stage": stage, "share": percent / 100.0})
         if not in_run:

@@ -1,5 +1,6 @@
 """Synthesize: from the pool of challenging environments to the ones that are trained in."""
 
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,16 +13,34 @@ from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SynthesisSettings
 from ses_core.synthesis.synthesize import draw_environments, fit_synthesis
 from storage.artifact_store import LocalArtifactStore
-from storage.environment_files import write_environments
+from storage.environment_files import (
+    ENVIRONMENTS_FILE,
+    read_environments,
+    write_environments,
+)
 from storage.materialize import Materialized, materialize
 from storage.night_contents import SYNTHESIS_FILE
 from storage.night_report import SynthesisUse
-from storage.selection_files import domain_digest, read_selection
+from storage.selection_files import POOL_FOLDER, domain_digest, read_pool
 from storage.stage_records import write_record
-from storage.stages import FIT, SYNTHESIZE
+from storage.stages import FILTER, FIT, SYNTHESIZE
 from storage.synthesizer_files import read_synthesizer, write_synthesizer
 from tasks.outcome import conclude
 from tasks.progress import report_progress
+
+
+@task(name="import environments", cache_policy=NO_CACHE)
+def import_environments(source: Path, *, store: LocalArtifactStore) -> Materialized:
+    """Take a folder of environments for a pool, in its order."""
+    domain = read_environments(source)
+    recipe = Recipe(FILTER, {"imported": domain_digest(domain)})
+
+    def build(directory: Path) -> None:
+        folder = directory / POOL_FOLDER
+        folder.mkdir()
+        shutil.copyfile(source / ENVIRONMENTS_FILE, folder / ENVIRONMENTS_FILE)
+
+    return conclude(materialize(store, recipe, build))
 
 
 @task(name="fit the synthesizer", cache_policy=NO_CACHE)
@@ -33,7 +52,7 @@ def fit_synthesizer(
     anew: bool = False,
 ) -> Materialized:
     """Learn what the challenging environments look like; anew only when their set changed."""
-    pool = read_selection(store.path(selection)).pool_environments
+    pool = read_pool(store.path(selection))
     recipe = Recipe(
         FIT,
         {
@@ -65,7 +84,7 @@ def sample_environments(
     anew: bool = False,
 ) -> Materialized:
     """Draw environments until enough of them can be crossed by the target robot."""
-    pool = read_selection(store.path(selection)).pool_environments
+    pool = read_pool(store.path(selection))
     recipe = Recipe(
         SYNTHESIZE,
         {

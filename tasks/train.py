@@ -19,6 +19,7 @@ from storage.policy_files import NamedPolicy, find_policy, write_curve, write_po
 from storage.stage_records import write_record
 from storage.stages import TRAIN
 from storage.training_record import TRAINING_FILE, TrainingRecord
+from storage.world_sets import read_worlds
 from tasks.outcome import conclude
 from tasks.progress import report_progress
 
@@ -75,6 +76,62 @@ def train_policy(
 
     return conclude(
         materialize(store, Recipe(TRAIN, asked, inputs=(environments,)), build, anew=anew)
+    )
+
+
+@task(name="train the policy in a folder", cache_policy=NO_CACHE)
+def train_in_folder(
+    environments: Path, *, parent: str, out: Path, store: LocalArtifactStore, settings: Settings
+) -> TrainingRecord:
+    """Go on from the parent in a folder of environments, and write the bundle into another."""
+    domain = read_environments(environments)
+    return save_training(
+        out,
+        [environment_task(environment) for environment in domain.environments],
+        parent=find_policy(parent, store.layout),
+        run_id="",
+        trained_in=f"{len(domain.environments)} environments of 5 m",
+        settings=settings,
+    )
+
+
+@task(name="pretrain the original policy", cache_policy=NO_CACHE)
+def pretrain_policy(
+    worlds: tuple[Path, ...],
+    *,
+    part: str | None,
+    resolution: float | None,
+    steps: int | None,
+    seed: int | None,
+    out: Path,
+    settings: Settings,
+) -> TrainingRecord:
+    """Train from random weights, by default as the shipped original policy was."""
+    from ses_core.learning.pretraining import (
+        PRETRAINING,
+        PRETRAINING_SIMULATION,
+        generated_worlds,
+        training_tasks,
+    )
+
+    asked = {"steps": steps, "seed": seed}
+    training = PRETRAINING.model_copy(
+        update={name: value for name, value in asked.items() if value is not None}
+    )
+    chosen = (
+        read_worlds(worlds, part=part, resolution=resolution)
+        if worlds
+        else generated_worlds("train")
+    )
+    return save_training(
+        out,
+        training_tasks(chosen, profile=settings.target_robot, seed=training.seed),
+        parent=None,
+        run_id="",
+        trained_in=f"{len(chosen)} worlds " + ("given" if worlds else "of the BARN generator"),
+        settings=settings.model_copy(
+            update={"training": training, "simulation": PRETRAINING_SIMULATION}
+        ),
     )
 
 
