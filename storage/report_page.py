@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from ses_core.evaluation.statistics import Interval
 from ses_core.pictures.evaluation_figure import draw_evaluation, draw_worlds
@@ -134,7 +134,7 @@ def _gallery(environments: Sequence[ShownEnvironment]) -> Markup:
             " · ".join(text for text in (shown.environment_id, shown.detail) if text),
             _data_uri(thumbnail(shown.cells, shown.observed)),
             shown.environment_id,
-            escape(shown.caption),
+            shown.caption,
         )
         for shown in environments
     )
