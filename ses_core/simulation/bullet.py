@@ -59,7 +59,7 @@ class BulletSimulator:
         self._substeps = max(1, round(PHYSICS_RATE_HZ * self._stack.time_step))
         self._profile = profile
         self._noise = settings.actuation_noise
-        self._bodies: list[_PhysicalSlot | None] = [None] * slots
+        self._bodies: list[PhysicalSlot | None] = [None] * slots
         self._meshes: dict[int, tuple[OccupancyGrid, RenderedWorld]] = {}
         self._rngs = [np.random.default_rng(0) for _ in range(slots)]
 
@@ -80,7 +80,7 @@ class BulletSimulator:
             self._rngs[number] = np.random.default_rng(seed)
             body = self._bodies[number]
             if body is None:
-                body = self._bodies[number] = _PhysicalSlot(
+                body = self._bodies[number] = PhysicalSlot(
                     self._profile, time_step=self.time_step / self._substeps
                 )
             body.build(self._mesh(task.world.grid), task.start)
@@ -124,7 +124,7 @@ class BulletSimulator:
                 body.close()
         self._bodies = [None] * self.slots
 
-    def _body(self, number: int) -> "_PhysicalSlot":
+    def _body(self, number: int) -> "PhysicalSlot":
         body = self._bodies[number]
         if body is None:
             raise ValueError(f"slot {number} has no episode, expected one after reset")
@@ -140,7 +140,7 @@ class BulletSimulator:
         return self._meshes[key][1]
 
 
-class _PhysicalSlot:
+class PhysicalSlot:
     """One physics client with one world and one robot in it."""
 
     def __init__(self, profile: RobotProfile, *, time_step: float) -> None:
@@ -233,6 +233,7 @@ class _PhysicalSlot:
         return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[..., :3]
 
     def close(self) -> None:
+        """Disconnect the client."""
         pybullet.disconnect(physicsClientId=self._client)
 
     def _touches(self) -> bool:

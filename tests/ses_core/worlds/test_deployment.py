@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+from ses_core.evaluation.outcomes import EpisodeOutcome
+from ses_core.geometry import Pose2D, wrap_angles
+from ses_core.learning.policies import FIXED_POLICIES
+from ses_core.navigation import NavigationTask, World
+from ses_core.occupancy import OccupancyGrid
+from ses_core.robot_profile import JACKAL
+from ses_core.settings import SimulationSettings
+from ses_core.worlds.deployment import Deployment, deploy, drifting_odometry
+
+SLOW = FIXED_POLICIES["dwa-slow"]
+
+
+def _task(length: float) -> NavigationTask:
+    """Drive `length` metres straight along a room 4 m wide."""
+    cells = np.zeros((40, 120), dtype=np.bool_)
+    grid = OccupancyGrid(cells=cells, resolution=0.1, origin=(-2.0, -2.0))
+    return NavigationTask(
+        world=World(world_id="room", grid=grid), start=Pose2D(0.0, 0.0, 0.2), goal=(length, 0.5)
+    )
+
+
+TASKS = [_task(3.0), _task(6.0), _task(4.0)]
+
+
+def _deploy(slots: int, *, seed: int = 0, drift: float = 0.01) -> dict[int, Deployment]:
+    deployments = deploy(
+        TASKS,
+        SLOW,
+        seed=seed,
+        simulation=SimulationSettings(),
+        profile=JACKAL,
+        slots=slots,
+        odometry_drift=drift,
+    )
+    return {deployment.number: deployment for deployment in deployments}
+
+
+def test_every_task_is_driven_once_to_its_goal() -> None:
+    driven = _deploy(2)
+    assert sorted(driven) == [0, 1, 2]
+    for number, deployment in driven.items():
+        assert deployment.task is TASKS[number]
+        assert deployment.outcome is EpisodeOutcome.SUCCESS
+        assert deployment.poses[0].tolist() == [0.0, 0.0, 0.2]
+        to_goal = np.hypot(*(deployment.poses[:, :2] - TASKS[number].goal).T)
+        assert to_goal[-1] <= 1.0 < to_goal[-2]
+
+
+def test_records_fit_together_step_by_step() -> None:
+    deployment = _deploy(3)[1]
+    steps = len(deployment.times)
+    assert np.allclose(np.diff(deployment.times), 0.05)
+    assert deployment.commands.shape == (steps - 1, 2)
+    assert deployment.scan_steps.tolist() == list(range(0, steps, 4))
+    assert deployment.ranges.shape == (len(deployment.scan_steps), 720)
+    # The measured speed is that of the motion that led to a step.
+    driven = np.hypot(*np.diff(deployment.poses[:, :2], axis=0).T) / 0.05
+    assert np.allclose(driven, np.abs(deployment.measured[1:, 0]), atol=0.02)
+    assert deployment.commands[:, 0].max() == pytest.approx(0.5, abs=1e-6)
+
+
+def test_scans_belong_to_the_poses_they_are_stored_with() -> None:
+    deployment = _deploy(3)[1]
+    middle = 360  # the beam straight ahead, to within half a beam
+    for k, step in enumerate(deployment.scan_steps):
+        x, y, yaw = deployment.poses[step]
+        # The room reaches from (-2, -2) to (10, 2).
+        ahead = min(
+            ((10.0 if np.cos(yaw) > 0 else -2.0) - x) / np.cos(yaw),
+            ((2.0 if np.sin(yaw) > 0 else -2.0) - y) / np.sin(yaw) if np.sin(yaw) else np.inf,
+        )
+        assert deployment.ranges[k, middle] == pytest.approx(ahead, rel=0.05, abs=0.06)
+
+
+def test_a_deployment_depends_on_its_number_and_seed_alone() -> None:
+    alone, among = _deploy(1), _deploy(3)
+    for number in alone:
+        assert alone[number].poses.tobytes() == among[number].poses.tobytes()
+        assert alone[number].odometry.tobytes() == among[number].odometry.tobytes()
+        assert alone[number].ranges.tobytes() == among[number].ranges.tobytes()
+    assert _deploy(3, seed=1)[0].poses.tobytes() != alone[0].poses.tobytes()
+
+
+def test_no_task_no_deployment() -> None:
+    settings = SimulationSettings()
+    assert list(deploy([], SLOW, seed=0, simulation=settings, profile=JACKAL)) == []
+
+
+def test_odometry_without_drift_is_the_true_path_seen_from_the_start() -> None:
+    rng = np.random.default_rng(5)
+    poses = np.cumsum(rng.normal(0.05, 0.05, (200, 3)), axis=0)
+    odometry = drifting_odometry(poses, drift=0.0, rng=rng)
+    assert odometry[0].tolist() == [0.0, 0.0, 0.0]
+    cosine, sine = np.cos(poses[0, 2]), np.sin(poses[0, 2])
+    x = poses[0, 0] + cosine * odometry[:, 0] - sine * odometry[:, 1]
+    y = poses[0, 1] + sine * odometry[:, 0] + cosine * odometry[:, 1]
+    assert np.allclose(np.column_stack((x, y)), poses[:, :2])
+    assert np.allclose(wrap_angles(odometry[:, 2] + poses[0, 2] - poses[:, 2]), 0.0, atol=1e-9)
+
+
+def test_odometry_drifts_by_about_its_share_of_the_way() -> None:
+    way = np.column_stack((np.linspace(0.0, 10.0, 400), np.zeros(400), np.zeros(400)))
+    ends = np.array(
+        [drifting_odometry(way, drift=0.02, rng=np.random.default_rng(k))[-1] for k in range(400)]
+    )
+    assert np.std(ends[:, 0] - 10.0) == pytest.approx(0.2, rel=0.2)
+    assert np.std(ends[:, 2]) == pytest.approx(0.02 * np.sqrt(10.0), rel=0.2)

@@ -1,0 +1,107 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ses_core.errors import WorldError
+from ses_core.occupancy import occupied_at
+from ses_core.worlds.cellular_automata import COURSE_GOAL, COURSE_START, barn_course, grow_field
+from storage.gazebo_worlds import read_gazebo_world
+from tests.shared_data import shared_data
+
+
+def _cylinder(name: str, x: float, y: float, *, radius: float = 0.075) -> str:
+    return (
+        f"<model name='{name}'><static>1</static><pose frame=''>{x} {y} 0 0 0 0</pose>"
+        f"<link name='link'><collision name='c'><geometry><cylinder><radius>{radius}</radius>"
+        "<length>1</length></cylinder></geometry></collision></link></model>"
+    )
+
+
+def _box(x: float, y: float, yaw: float, size: str, *, link: str = "0 0 0 0 0 0") -> str:
+    return (
+        f"<model name='box'><pose>{x} {y} 0 0 0 {yaw}</pose><link name='link'><pose>{link}</pose>"
+        f"<collision name='c'><geometry><box><size>{size}</size></box></geometry></collision>"
+        "</link></model>"
+    )
+
+
+def _write(folder: Path, *models: str, state: str = "") -> Path:
+    path = folder / "place.world"
+    path.write_text(
+        f"<?xml version='1.0'?><sdf version='1.6'><world name='default'>{''.join(models)}"
+        f"<state world_name='default'>{state}</state></world></sdf>"
+    )
+    return path
+
+
+def test_a_field_written_as_barn_does_reads_back_cell_for_cell(tmp_path: Path) -> None:
+    course = barn_course(grow_field(0.2, 3, rng=np.random.default_rng(1)))
+    places = [(-4.5 + 0.15 * (ix + 0.5), 0.15 * (iy + 0.5)) for iy, ix in np.argwhere(course.cells)]
+    models = [_cylinder(f"unit_cylinder_{k}", x, y) for k, (x, y) in enumerate(places)]
+    world = read_gazebo_world(_write(tmp_path, *models))
+    assert np.array_equal(world.grid.cells, course.cells)
+    assert world.grid.origin == course.origin
+    assert world.course == (COURSE_START, COURSE_GOAL)
+    assert world.source == "barn"
+
+
+def test_models_in_the_state_are_not_read_again(tmp_path: Path) -> None:
+    one = _cylinder("a", 0.0, 0.0, radius=0.3)
+    alone = read_gazebo_world(_write(tmp_path, one))
+    repeated = read_gazebo_world(_write(tmp_path, one, state=_cylinder("a", 9.0, 9.0, radius=0.3)))
+    assert np.array_equal(alone.grid.cells, repeated.grid.cells)
+
+
+def test_turned_boxes_stand_where_model_and_link_put_them(tmp_path: Path) -> None:
+    # 2 x 0.2 m, turned by 90 degrees: it reaches along y; its link is 1 m along the turned x.
+    path = _write(tmp_path, _box(5.0, 1.0, math.pi / 2, "2 0.2 1", link="1 0 0 0 0 0"))
+    grid = read_gazebo_world(path).grid
+    points = np.array([(5.0, 2.0), (5.0, 1.1), (5.0, 2.9), (5.3, 2.0), (5.0, 0.8)])
+    assert occupied_at(grid, points, outside=False).tolist() == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<sdf><world>", "is no XML"),
+        ("<sdf></sdf>", "has no <world>"),
+        ("<sdf><world name='a'></world></sdf>", "no cylinder or box"),
+        (
+            "<!DOCTYPE x [<!ENTITY a 'aaaa'><!ENTITY b '&a;&a;'>]><sdf><world>&b;</world></sdf>",
+            "document type",
+        ),
+        (
+            "<sdf><world name='a'>"
+            + _cylinder("a", 0, 0).replace("0.075", "wide")
+            + "</world></sdf>",
+            "expected 1 numbers",
+        ),
+        (
+            "<sdf><world name='a'>"
+            + _cylinder("a", 0, 0).replace("0 0 0 0 0 0", "nan 0 0 0 0 0")
+            + "</world></sdf>",
+            "expected 6 numbers",
+        ),
+        (
+            "<sdf><world name='a'>"
+            + _cylinder("a", 0, 0)
+            + _cylinder("b", 1e7, 1e7)
+            + "</world></sdf>",
+            "expected at most",
+        ),
+    ],
+)
+def test_a_bad_world_is_refused_with_its_reason(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "bad.world"
+    path.write_text(text)
+    with pytest.raises(WorldError, match=said):
+        read_gazebo_world(path)
+
+
+def test_an_original_barn_world_has_its_cylinders_and_course() -> None:
+    world = read_gazebo_world(shared_data("barn", "world_0.world"))
+    assert world.grid.cells.shape == (94, 30)
+    assert np.count_nonzero(world.grid.cells) == 209
+    assert world.course == (COURSE_START, COURSE_GOAL)

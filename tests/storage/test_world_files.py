@@ -1,0 +1,114 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ses_core.arrays import ByteArray
+from ses_core.errors import WorldError
+from ses_core.occupancy import occupied_at
+from storage.world_files import read_image, read_map_server
+from tests.shared_data import shared_data
+
+FREE, WALL, UNKNOWN = 254, 0, 205
+
+
+def _picture() -> ByteArray:
+    """A map 8 x 6 pixels as map savers write it: unknown around, free inside, one wall pixel."""
+    pixels = np.full((6, 8), UNKNOWN, dtype=np.uint8)
+    pixels[2:5, 3:7] = FREE
+    pixels[2, 3] = WALL  # top left of the free part
+    return pixels
+
+
+def _write_map(folder: Path, *, extra: str = "", pixels: ByteArray | None = None) -> Path:
+    Image.fromarray(_picture() if pixels is None else pixels).save(folder / "floor.pgm")
+    path = folder / "floor.yaml"
+    path.write_text(
+        "image: floor.pgm\nresolution: 0.1\norigin: [-1.0, 2.0, 0.0]\n"
+        f"occupied_thresh: 0.65\n{extra}"
+    )
+    return path
+
+
+def test_a_map_is_read_where_its_yaml_puts_it(tmp_path: Path) -> None:
+    world = read_map_server(_write_map(tmp_path, extra="free_thresh: 0.196\nnegate: 0\n"))
+    # Pixel (row 4, column 3), free, lies at x = -1 + 3.5 * 0.1, y = 2 + (6 - 4 - 0.5) * 0.1.
+    points = np.array([(-0.65, 2.15), (-0.65, 2.35), (-0.55, 2.35), (-0.75, 2.15)])
+    assert occupied_at(world.grid, points).tolist() == [False, True, False, True]
+    assert np.count_nonzero(~world.grid.cells) == 11
+    assert (world.name, world.source) == ("floor", "map_server")
+
+
+def test_what_a_map_does_not_know_is_no_ground_whatever_the_threshold(tmp_path: Path) -> None:
+    world = read_map_server(_write_map(tmp_path, extra="free_thresh: 0.25\n"))
+    assert np.count_nonzero(~world.grid.cells) == 11
+
+
+def test_a_negated_map_reads_dark_as_free(tmp_path: Path) -> None:
+    pixels = np.full((4, 4), 255, dtype=np.uint8)
+    pixels[1, 1:3] = 0
+    world = read_map_server(_write_map(tmp_path, extra="negate: 1\n", pixels=pixels))
+    assert np.count_nonzero(~world.grid.cells) == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("image: floor.pgm\norigin: [0, 0, 0]\n", "resolution: field required"),
+        ("image: floor.pgm\nresolution: -1\norigin: [0, 0, 0]\n", "greater than 0"),
+        ("image: gone.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n", "cannot be read as an image"),
+        ("- a\n- b\n", "content: input should be"),
+        ("{", "is no YAML"),
+        ("a: &a [*a]\n", "image: field required"),
+        ("[" * 2000, "is no YAML"),
+    ],
+)
+def test_a_bad_map_is_refused_with_its_reason(tmp_path: Path, content: str, said: str) -> None:
+    path = _write_map(tmp_path)
+    path.write_text(content)
+    with pytest.raises(WorldError, match=said) as refusal:
+        read_map_server(path)
+    assert "floor" in str(refusal.value) or "gone" in str(refusal.value)
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "RGB", "RGBA", "P", "I;16"])
+def test_images_of_every_depth_give_the_same_cells(tmp_path: Path, mode: str) -> None:
+    light = np.full((5, 7), 0, dtype=np.uint8)
+    light[1:4, 2:6] = 255
+    image = Image.fromarray(light)
+    if mode == "I;16":
+        image = Image.fromarray(light.astype(np.uint16) * 257)
+    elif mode != "L":
+        image = image.convert(mode)
+    image.save(tmp_path / "plan.png")
+    world = read_image(tmp_path / "plan.png", resolution=0.05)
+    assert world.grid.cells.shape == (5, 6)
+    assert np.count_nonzero(~world.grid.cells) == 12
+
+
+def test_a_fine_plan_is_coarsened_without_losing_a_thin_wall(tmp_path: Path) -> None:
+    light = np.full((200, 200), 255, dtype=np.uint8)
+    light[:, 101] = 0
+    Image.fromarray(light).save(tmp_path / "plan.png")
+    world = read_image(tmp_path / "plan.png", resolution=0.01)
+    assert world.grid.resolution == pytest.approx(0.05)
+    assert world.grid.cells.shape == (40, 40)
+    assert world.grid.cells[:, 20].all()
+    assert np.count_nonzero(world.grid.cells) == 40
+
+
+def test_an_image_without_free_ground_or_that_is_none_is_refused(tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((5, 5), dtype=np.uint8)).save(tmp_path / "dark.png")
+    (tmp_path / "fake.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
+    with pytest.raises(WorldError, match="no free cell"):
+        read_image(tmp_path / "dark.png", resolution=0.1)
+    with pytest.raises(WorldError, match="cannot be read as an image"):
+        read_image(tmp_path / "fake.png", resolution=0.1)
+
+
+def test_a_real_map_keeps_only_what_was_explored() -> None:
+    world = read_map_server(shared_data("maps", "zaki0929_2019jan17_expt04.yaml"))
+    assert world.grid.width_m == pytest.approx(16.4, abs=0.2)
+    assert world.grid.height_m == pytest.approx(12.3, abs=0.2)
+    assert -50.0 < world.grid.origin[0] < 50.0
