@@ -1,5 +1,6 @@
 from datetime import UTC, date, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,12 +10,15 @@ from rosbags.typesys import Stores, get_typestore
 
 from ses_core.errors import WorldError
 from ses_core.evaluation.outcomes import EpisodeOutcome
+from ses_core.extraction.resampling import resample
 from ses_core.geometry import Pose2D
 from ses_core.navigation import NavigationTask, World
 from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import JACKAL
+from ses_core.settings import DecoderLimits, IngestSettings
 from ses_core.worlds.deployment import Deployment
 from storage.deployment_logs import FleetFormat, FleetLog, write_deployments
+from storage.rosbag_logs import RosbagLogReader
 from storage.trajectory_tables import read_log_row, read_trajectories
 
 DAY = date(2026, 11, 22)
@@ -46,7 +50,7 @@ def _deployment(number: int) -> Deployment:
         task=TASKS[number],
         seed=number,
         outcome=EpisodeOutcome.SUCCESS,
-        times=np.arange(steps) * 0.05,
+        times=np.arange(steps, dtype=np.float64) * 0.05,
         poses=odometry + 1.0,
         odometry=odometry,
         measured=np.vstack(([0.0, 0.0], commands)),
@@ -85,11 +89,12 @@ def test_rosbags_reads_back_the_values_written(tmp_path: Path, log_format: Fleet
     log = next(log for log in _write(tmp_path, log_format) if log.number == 0)
     written = _deployment(0)
     start = int(datetime(2026, 11, 22, 6, tzinfo=UTC).timestamp()) * 10**9
-    odometry, commands, scans, count = [], [], [], 0
+    odometry, commands, count = [], [], 0
+    scans: list[tuple[int, Any]] = []
     with AnyReader([log.path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         for connection, stamp, data in reader.messages():
             count += 1
-            message = reader.deserialize(data, connection.msgtype)
+            message: Any = reader.deserialize(data, connection.msgtype)
             if connection.topic == "/odom":
                 position = message.pose.pose.position
                 odometry.append((stamp, position.x, position.y, message.twist.twist.linear.x))
@@ -130,6 +135,28 @@ def test_tables_hold_what_ingest_would_have_made(tmp_path: Path) -> None:
     written = _deployment(0)
     assert np.allclose(trajectory.poses, written.odometry, atol=1e-6)
     assert int(np.sum(trajectory.speed < 0.0)) == 10
+
+
+@pytest.mark.parametrize("log_format", ["mcap", "db3", "bag"])
+def test_tables_and_bags_give_the_same_trajectories(
+    tmp_path: Path, log_format: FleetFormat
+) -> None:
+    tables, bags = (
+        {log.number: log.path for log in _write(tmp_path / kind, kind)}
+        for kind in ("tables", log_format)
+    )
+    reader = RosbagLogReader(limits=DecoderLimits(), workdir=tmp_path)
+    recording = reader.read(bags[0], profile=JACKAL, pose_source="odometry")
+    (decoded,) = resample(recording, profile=JACKAL, settings=IngestSettings())
+    (direct,) = read_trajectories(tables[0])
+    assert decoded.stamps_ns.tolist() == direct.stamps_ns.tolist()
+    assert np.allclose(decoded.poses, direct.poses, atol=1e-9)
+    assert np.array_equal(decoded.speed, direct.speed)
+    assert np.allclose(decoded.commanded, direct.commanded)
+    assert decoded.scans is not None
+    assert direct.scans is not None
+    assert np.array_equal(decoded.scans.ranges, direct.scans.ranges)
+    assert recording.warnings == {}
 
 
 def test_a_log_is_never_written_over(tmp_path: Path) -> None:
