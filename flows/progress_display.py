@@ -53,8 +53,9 @@ class ProgressDisplay:
             self._bars.start()
         if stage not in self._bar_of_stage:
             self._bar_of_stage[stage] = self._bars.add_task(stage, total=1.0)
+        described = f"{stage} {text}".rstrip()
         bar = self._bar_of_stage[stage]
-        self._bars.update(bar, completed=share, description=f"{stage} {text}".rstrip())
+        self._bars.update(bar, completed=share, description=described, refresh=True)
         if share >= 1.0:
             self._bars.remove_task(self._bar_of_stage.pop(stage))
         if not self._bar_of_stage:

@@ -101,9 +101,7 @@ def pretrain(
             worlds=tuple(worlds or ()),
             part=part,
             resolution=resolution,
-            steps=steps,
-            seed=seed,
-            settings=command.settings(),
+            settings=settings,
         )
     answer_facts(command, summary.model_dump(mode="json"))
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from flows.command_arguments import (
@@ -36,6 +36,7 @@ def test_global_options_move_in_front_of_the_command(
     assert hoist_global_options(given_arguments) == expected
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.sampled_from(["status", "--json", "--root=a", "-x", "--limit", "3"])))
 def test_hoisting_loses_nothing_and_keeps_the_order_of_the_rest(arguments: list[str]) -> None:
     hoisted = hoist_global_options(arguments)

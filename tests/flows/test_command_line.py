@@ -34,7 +34,7 @@ def store(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("line", "found", "expected"),
     [
-        ("", "no command", "nightly, ingest, extract"),
+        ("", "no command", "nightly, demo, ingest"),
         ("nihgtly", "unknown command 'nihgtly'", "nightly"),
         ("nightly", "no --inbox", "a value"),
         ("nightly --inbox /none", "nothing at /none", "a folder"),
