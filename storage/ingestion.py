@@ -118,7 +118,8 @@ def take_in_again(
     """
     if refused.payload is None:
         raise LogError(refused.reason, f"nothing was kept of log {refused.log_id}: upload it again")
-    copy = store.layout.staging / f"retry-{refused.payload.name}-{refused.log_id}"
+    # Readers tell a recording by the end of its name.
+    copy = store.layout.staging / f"retry-{refused.log_id}{refused.payload.suffix}"
     if refused.payload.is_dir():
         shutil.copytree(refused.payload, copy, dirs_exist_ok=True)
     else:
