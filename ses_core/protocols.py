@@ -31,7 +31,10 @@ class FittedSynthesizer(Protocol):
     """Draws environments like those it was fitted to."""
 
     def sample(self, count: int, *, rng: Generator) -> BoolArray:
-        """Draw cells (count, 30, 30); whether they can be crossed is checked by the caller."""
+        """Draw cells (count or fewer, 30, 30), fewer where there are no more distinct ones.
+
+        Whether they can be crossed is checked by the caller.
+        """
         ...
 
     def arrays(self) -> Mapping[str, NDArray[np.generic]]:

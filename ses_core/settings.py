@@ -50,7 +50,7 @@ class IngestSettings(SettingsModel):
     )
     step_rate_hz: float = Field(20.0, gt=0, description="Clock of a trajectory (move_base's rate).")
     gap_s: float = Field(
-        2.0, gt=0, description="Longer without a pose cuts the trajectory (dropout)."
+        5.0, gt=0, description="Longer without a pose cuts the trajectory (dropout)."
     )
     steady_s: float = Field(
         60.0, ge=0, description="A file younger than this may still be arriving: it is waited for."
@@ -82,7 +82,7 @@ class ExtractionSettings(SettingsModel):
         0.25, gt=0, lt=1, description="Occupied from this share of hits among its beams."
     )
     hit_minimum: int = Field(
-        2, ge=1, description="Occupied needs hits in at least this many scans."
+        2, ge=1, description="Hits that occupy a cell; one, where no beam ever looked through."
     )
     scan_margin_s: float = Field(
         1.0, ge=0, description="Scans this long before and after a scenario are used and kept."

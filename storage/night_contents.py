@@ -145,10 +145,11 @@ def _funnel(
 def _sensitivity(night: NightArtifacts, selection: StoredSelection | None) -> Sensitivity | None:
     if selection is None:
         return None
+    filter_settings = night.settings.filter
     return Sensitivity(
         thresholds=selection.sensitivity.thresholds,
         challenging=selection.sensitivity.challenging,
-        threshold=night.settings.filter.threshold,
+        threshold=None if filter_settings.challenging_share else filter_settings.threshold,
         scenario_count=selection.funnels[selection.count_kind].scenarios,
     )
 
