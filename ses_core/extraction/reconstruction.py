@@ -179,11 +179,15 @@ def _scan_evidence(
 
 
 def _weigh(evidence: Evidence, settings: ExtractionSettings) -> ByteArray:
-    """Decide every fine cell [iy, ix] from its hits and passes."""
+    """Decide every fine cell [iy, ix] from its hits and passes.
+
+    One hit is enough where no beam ever looked through: far walls of a log with few scans.
+    """
     seen = evidence.hits + evidence.passes
     fine = np.where(seen > 0, np.uint8(FREE), np.uint8(UNKNOWN))
-    is_hit = (evidence.hits >= settings.hit_minimum) & (evidence.hits >= settings.hit_share * seen)
-    fine[is_hit] = OCCUPIED
+    is_sure = (evidence.hits >= settings.hit_minimum) | (evidence.passes == 0)
+    is_hit = (evidence.hits > 0) & (evidence.hits >= settings.hit_share * seen)
+    fine[is_sure & is_hit] = OCCUPIED
     return fine
 
 

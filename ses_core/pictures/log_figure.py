@@ -54,7 +54,7 @@ def log_figure(
         axes.set_title(_caption(number, one), fontsize=8, loc="left", pad=7)
     if len(shown) < len(numbered):
         right.suptitle(
-            f"the {len(shown)} hardest of {len(numbered)} places", fontsize=9, color=theme.ink
+            f"{len(shown)} of {len(numbered)} places, the hardest", fontsize=9, color=theme.ink
         )
     return png_bytes(figure)
 

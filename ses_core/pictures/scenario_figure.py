@@ -130,7 +130,14 @@ def draw_environment(
             label = f"shortest ({target.name})"
             line = upright(shortest)
             axes.plot(*line.T, color=theme.series[1], linewidth=1.4, ls="--", label=label)
-        axes.legend(loc="upper right", fontsize=8, framealpha=0.85)
+        axes.legend(
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.03),
+            ncols=2,
+            fontsize=8,
+            frameon=False,
+            labelcolor=theme.ink,
+        )
     _mark_ends(axes, theme)
 
 
@@ -182,7 +189,7 @@ def _draw_drive(
     bar.ax.tick_params(colors=theme.ink, labelsize=8)
     _mark_ends(axes, theme)
     if is_reversing.any():
-        axes.legend(loc="upper right", fontsize=8, framealpha=0.85)
+        axes.legend(loc="upper right", fontsize=8, facecolor=theme.paper, labelcolor=theme.ink)
 
 
 def _fastest(speed: FloatArray) -> float:

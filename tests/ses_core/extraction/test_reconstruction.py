@@ -16,13 +16,13 @@ from ses_core.extraction.reconstruction import (
     scans_of,
     scenario_frame,
 )
-from ses_core.extraction.recording import RecordedMap
+from ses_core.extraction.recording import RecordedMap, ScanStream
 from ses_core.extraction.segmentation import segment
 from ses_core.extraction.trajectory import Trajectory
 from ses_core.geometry import Pose2D, inverse
 from ses_core.occupancy import ENVIRONMENT_RESOLUTION_M, environment_cell_centres
 from ses_core.settings import ExtractionSettings
-from tests.ses_core.extraction.drives import CORRIDOR, scanned_drive, straight
+from tests.ses_core.extraction.drives import CORRIDOR, STEP_NS, drive_along, scanned_drive, straight
 
 SETTINGS = ExtractionSettings()
 BODY_RADIUS = 0.165
@@ -183,6 +183,28 @@ def test_scans_that_contradict_each_other_are_told_apart_from_walls() -> None:
     lost = rebuilt(good)
     assert lost.contradicted_fraction is not None
     assert lost.contradicted_fraction > 0.6
+
+
+def test_one_hit_is_a_wall_only_where_no_beam_looked_through() -> None:
+    # From one spot, the first scan reads something at 1.5 m and the second looks past it.
+    trajectory = drive_along(
+        straight(5.1),
+        scans=ScanStream(
+            stamps_ns=np.array([0, STEP_NS]),
+            ranges=np.array([[1.5], [2.6]], dtype=np.float32),
+            angles=np.array([0.5]),
+            range_max=30.0,
+            mount=Pose2D(0.0, 0.0),
+        ),
+        scan_poses=np.zeros((2, 3)),
+    )
+    end = 2.6 * np.array([math.cos(0.5), math.sin(0.5)])
+    place = rebuilt(trajectory)
+    assert place.cells.sum() == 1
+    assert place.cells[
+        29 - math.floor(end[0] / ENVIRONMENT_RESOLUTION_M),
+        14 - math.floor(end[1] / ENVIRONMENT_RESOLUTION_M),
+    ]
 
 
 def test_only_scans_within_the_margin_count() -> None:
