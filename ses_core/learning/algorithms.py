@@ -27,7 +27,11 @@ from ses_core.settings import TrainingSettings
 _ROLLOUT = 32
 """Decisions of each robot between two updates of PPO: about one episode and a half."""
 
-_MINIBATCHES = 4
+_MINIBATCHES, _EPOCHS = 8, 10
+"""Of PPO per rollout: many, for a decision costs more to simulate than to learn from."""
+
+_LEAST_BATCH = 64
+
 _EXPLORATION = {"scratch": 0.6, "fine-tuning": 0.3}
 """Standard deviation of PPO's and SAC's first actions, in units of the action."""
 
@@ -139,17 +143,19 @@ def _make_ppo(
     env: VecEnv, hidden: list[int], settings: TrainingSettings, log_deviation: float
 ) -> tuple[PPO, int]:
     """Make PPO, whose rollouts are cut so that they make up the decisions asked for."""
-    rollouts = max(1, round(settings.steps / (_ROLLOUT * env.num_envs)))
-    whole = settings.steps // (_MINIBATCHES * env.num_envs * rollouts)
-    length = _MINIBATCHES * max(1, whole)
+    rollouts = max(1, settings.steps // (_ROLLOUT * env.num_envs))
+    length = max(2, settings.steps // (env.num_envs * rollouts))
+    if length > _MINIBATCHES:
+        length -= length % _MINIBATCHES
+    minibatches = max(1, min(_MINIBATCHES, length * env.num_envs // _LEAST_BATCH))
     first_rate = settings.learning_rate or 3e-4
     learner = PPO(
         _SquashedMeanPolicy,
         env,
         learning_rate=lambda remaining: first_rate * (0.1 + 0.9 * remaining),
         n_steps=length,
-        batch_size=length * env.num_envs // _MINIBATCHES,
-        n_epochs=5,
+        batch_size=math.ceil(length * env.num_envs / minibatches),
+        n_epochs=_EPOCHS,
         gamma=settings.gamma,
         target_kl=0.03,
         policy_kwargs={

@@ -12,6 +12,8 @@ from ses_core.settings import SimulationSettings, TrainingSettings
 from ses_core.worlds.cellular_automata import generate_barn_world
 from ses_core.worlds.pairs import sample_tasks
 
+Part = Literal["train", "test"]
+
 WORLD_COUNT = 300
 """Worlds of the generator: 250 to train in and 50 to test in, as many as BARN has."""
 
@@ -21,7 +23,7 @@ HELD_OUT_EVERY = 6
 WORLD_SEED = 20_211_001
 """Seed of those worlds."""
 
-PRETRAINING = TrainingSettings(steps=120_000)
+PRETRAINING = TrainingSettings(steps=60_000, parallel_envs=50)
 """Settings of the shipped original policy."""
 
 PRETRAINING_SIMULATION = SimulationSettings(sensing_rate_hz=2.5)
@@ -30,14 +32,18 @@ PRETRAINING_SIMULATION = SimulationSettings(sensing_rate_hz=2.5)
 The policy decides once per second; grids at 1 to 20 Hz were measured to give equal results."""
 
 
-def generated_worlds(part: Literal["train", "test"]) -> list[World]:
-    """Generate the worlds that the original policy is trained in, or those it is tested in."""
-    numbers = [
+def world_numbers(part: Part) -> list[int]:
+    """Number the worlds that the original policy is trained in, or those it is tested in."""
+    return [
         number
         for number in range(WORLD_COUNT)
         if (number % HELD_OUT_EVERY == 0) == (part == "test")
     ]
-    return [generate_barn_world(number, seed=WORLD_SEED).world for number in numbers]
+
+
+def generated_worlds(part: Part) -> list[World]:
+    """Generate those worlds."""
+    return [generate_barn_world(number, seed=WORLD_SEED).world for number in world_numbers(part)]
 
 
 def training_tasks(
@@ -45,14 +51,9 @@ def training_tasks(
 ) -> list[NavigationTask]:
     """Give a world's own course, or start-goal pairs drawn in it where it has none."""
     rng = np.random.default_rng(seed)
-    tasks: list[NavigationTask] = []
-    for world in worlds:
-        if world.course is None:
-            tasks += sample_tasks(world, pairs, profile=profile, rng=rng)
-        else:
-            start, goal = world.course
-            tasks.append(NavigationTask(world=world, start=start, goal=goal))
-    return tasks
+    return [
+        task for world in worlds for task in sample_tasks(world, pairs, profile=profile, rng=rng)
+    ]
 
 
 def pretrain(

@@ -28,6 +28,8 @@ class VectorNavigationEnv(VecEnv):
     `t` seconds of driving), `outcome` and `terminal_observation`.
     """
 
+    render_mode = None
+
     def __init__(self, process: DecisionProcess, *, rng: Generator) -> None:
         super().__init__(
             process.simulator.slots, observation_space(process.observation), action_space()

@@ -1,0 +1,117 @@
+"""Tests of the learners' actors against the policies they start as."""
+
+from typing import Literal
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from ses_core.arrays import Float32Array
+from ses_core.learning.algorithms import (
+    actor_parameters,
+    extract_policy,
+    make_learner,
+)
+from ses_core.learning.navigation_env import action_space, observation_space
+from ses_core.learning.observation import DEFAULT_OBSERVATION
+from ses_core.learning.policies import ParameterPolicy, random_policy
+from ses_core.settings import TrainingSettings
+
+Algorithm = Literal["ppo", "td3", "sac"]
+ALGORITHMS: tuple[Algorithm, ...] = ("ppo", "td3", "sac")
+
+
+class Still(gymnasium.Env[Float32Array, Float32Array]):
+    """Episodes of one decision, all alike."""
+
+    observation_space = observation_space(DEFAULT_OBSERVATION)
+    action_space = action_space()
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[Float32Array, dict[str, object]]:
+        return np.zeros(DEFAULT_OBSERVATION.length, dtype=np.float32), {}
+
+    def step(
+        self, action: Float32Array
+    ) -> tuple[Float32Array, float, bool, bool, dict[str, object]]:
+        return np.zeros(DEFAULT_OBSERVATION.length, dtype=np.float32), 1.0, True, False, {}
+
+
+def some_policy() -> ParameterPolicy:
+    policy = random_policy(DEFAULT_OBSERVATION, (24, 12), rng=np.random.default_rng(0))
+    return ParameterPolicy(
+        observation=policy.observation,
+        weights=(*policy.weights[:-1], policy.weights[-1] * 50),
+        biases=policy.biases,
+    )
+
+
+def still_env(count: int = 2) -> DummyVecEnv:
+    return DummyVecEnv([Still for _ in range(count)])
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_a_learner_starts_as_the_policy_it_goes_on_from(algorithm: Algorithm) -> None:
+    settings = TrainingSettings(algorithm=algorithm, steps=64)
+    start = some_policy()
+    learner, _ = make_learner(still_env(), start, settings=settings, is_fine_tuning=True)
+    seen = np.random.default_rng(1).uniform(-0.5, 0.5, (30, 129)).astype(np.float32)
+    predicted, _ = learner.predict(seen, deterministic=True)
+    np.testing.assert_allclose(predicted, start.actions(seen.astype(np.float64)), atol=1e-5)
+    copied = extract_policy(learner, start.observation)
+    for matrix, copy in zip(start.weights, copied.weights, strict=True):
+        np.testing.assert_array_equal(matrix, copy)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_exploration_differs_between_the_robots_of_a_batch(algorithm: Algorithm) -> None:
+    settings = TrainingSettings(algorithm=algorithm, steps=64)
+    taken: list[Float32Array] = []
+
+    class Recorder(DummyVecEnv):
+        def step_async(self, actions: Float32Array) -> None:
+            taken.append(actions.copy())
+            super().step_async(actions)
+
+    env = Recorder([Still for _ in range(3)])
+    learner, decisions = make_learner(env, some_policy(), settings=settings, is_fine_tuning=True)
+    learner.learn(decisions)
+    assert len(np.unique(taken[0].round(6), axis=0)) == 3
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_a_frozen_actor_stays_while_its_critic_learns(algorithm: Algorithm) -> None:
+    settings = TrainingSettings(algorithm=algorithm, steps=64)
+    start = some_policy()
+    learner, decisions = make_learner(still_env(), start, settings=settings, is_fine_tuning=True)
+    for parameter in actor_parameters(learner):
+        parameter.requires_grad_(False)
+    frozen = {id(parameter) for parameter in actor_parameters(learner)}
+    others = [one for one in learner.policy.parameters() if id(one) not in frozen]
+    before = [one.detach().clone() for one in others]
+    learner.learn(decisions)
+    kept = extract_policy(learner, start.observation)
+    for old, new in zip(start.weights, kept.weights, strict=True):
+        np.testing.assert_array_equal(old, new)
+    assert any(not torch.equal(old, new) for old, new in zip(before, others, strict=True))
+
+
+@pytest.mark.parametrize("steps", [64, 100, 1000, 3300])
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_whole_rollouts_come_close_to_the_decisions_asked_for(
+    algorithm: Algorithm, steps: int
+) -> None:
+    settings = TrainingSettings(algorithm=algorithm, steps=steps)
+    _, decisions = make_learner(still_env(4), some_policy(), settings=settings, is_fine_tuning=True)
+    assert 0.75 * steps <= decisions <= steps
+
+
+def test_the_authors_preset_has_their_constants() -> None:
+    settings = TrainingSettings(algorithm="td3", preset="authors", gamma=0.95, steps=1000)
+    learner, _ = make_learner(still_env(4), some_policy(), settings=settings, is_fine_tuning=False)
+    assert learner.lr_schedule(1.0) == 1e-5
+    assert learner.gradient_steps == 4  # type: ignore[attr-defined]  # of TD3: one per decision
+    assert learner.n_steps == 4  # type: ignore[attr-defined]  # of TD3: returns over 4 decisions

@@ -1,0 +1,83 @@
+"""Tests of the Gymnasium environment in the real simulator."""
+
+import warnings
+
+import gymnasium.utils.env_checker as gymnasium_checker
+import numpy as np
+import pytest
+import stable_baselines3.common.env_checker as learner_checker
+
+from ses_core.learning.navigation_env import NavigationEnv
+from ses_core.navigation import NavigationTask
+from ses_core.robot_profile import JACKAL
+from ses_core.settings import SimulationSettings
+from ses_core.simulation.factory import make_simulator
+from tests.ses_core.learning.places import closed_room, corridor
+
+FASTEST = np.ones(7, dtype=np.float32)
+
+
+def make_env(*tasks: NavigationTask, slots: int = 1) -> NavigationEnv:
+    settings = SimulationSettings(stuck_time_s=6.0)
+    simulator = make_simulator("batch", slots=slots, profile=JACKAL, settings=settings)
+    return NavigationEnv(simulator, tasks=tasks or [corridor()])
+
+
+@pytest.mark.parametrize(
+    "check", [gymnasium_checker.check_env, learner_checker.check_env], ids=["gymnasium", "sb3"]
+)
+def test_the_env_passes_the_checkers(check: object) -> None:
+    assert callable(check)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # An env made without a registry has no spec to make a second one from.
+        warnings.filterwarnings("ignore", message=".*Not able to test alternative render modes.*")
+        warnings.filterwarnings("ignore", message=".*env.spec.*")
+        check(make_env(), skip_render_check=True)
+
+
+def test_progress_and_success_are_rewarded() -> None:
+    env = make_env()
+    _, info = env.reset(seed=0)
+    assert info == {}
+    total, terminated, decisions = 0.0, False, 0
+    while not terminated:
+        observation, reward, terminated, truncated, info = env.step(0.0 * FASTEST)
+        total += reward
+        decisions += 1
+        assert not truncated
+        assert observation.dtype == np.float32
+    assert info["outcome"] == "success"
+    # 4 m away at first, less than 1 m at last, and 20 for getting there.
+    assert 23.0 <= total <= 23.6
+    assert decisions == pytest.approx(info["time"], abs=1.0)
+
+
+def test_a_failure_costs_the_penalty() -> None:
+    env = make_env(closed_room())
+    env.reset(seed=0)
+    terminated, reward = False, 0.0
+    while not terminated:
+        _, reward, terminated, _, info = env.step(0.0 * FASTEST)
+    assert info["outcome"] in {"stuck", "collision"}
+    assert reward < -17.0
+
+
+def test_actions_act() -> None:
+    env = make_env()
+    travelled = []
+    for action in (-FASTEST, FASTEST):
+        env.reset(seed=1)
+        travelled.append(env.step(action)[1])
+    assert travelled[1] > 2.0 * travelled[0]
+
+
+def test_more_than_one_slot_is_refused() -> None:
+    with pytest.raises(ValueError, match="has 2 slots, expected 1"):
+        make_env(slots=2)
+
+
+def test_no_task_is_refused() -> None:
+    simulator = make_simulator("batch", slots=1, profile=JACKAL, settings=SimulationSettings())
+    with pytest.raises(ValueError, match="found no task"):
+        NavigationEnv(simulator, tasks=[])

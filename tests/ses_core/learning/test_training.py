@@ -1,0 +1,101 @@
+"""Tests of training in the real simulator."""
+
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from ses_core.learning.observation import AUTHORS_OBSERVATION, DEFAULT_OBSERVATION
+from ses_core.learning.policies import ParameterPolicy, random_policy
+from ses_core.learning.training import TrainingResult, train
+from ses_core.planning.parameters import PARAMETER_NAMES
+from ses_core.robot_profile import JACKAL
+from ses_core.settings import SimulationSettings, TrainingSettings
+from tests.ses_core.learning.places import corridor
+
+SHORT = TrainingSettings(steps=128, parallel_envs=4, critic_share=0.0)
+SEEN = np.random.default_rng(9).uniform(-0.5, 0.5, (40, DEFAULT_OBSERVATION.length))
+
+
+def parent() -> ParameterPolicy:
+    return random_policy(DEFAULT_OBSERVATION, (32, 32), rng=np.random.default_rng(1))
+
+
+def run(
+    settings: TrainingSettings, start: ParameterPolicy | None, *, stops: bool = False
+) -> TrainingResult:
+    return train(
+        [corridor()],
+        parent=start,
+        settings=settings,
+        simulation=SimulationSettings(sensing_rate_hz=2.0),
+        profile=JACKAL,
+        deadline=lambda: stops,
+    )
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "td3", "sac"])
+def test_training_changes_weights_and_behaviour(algorithm: Literal["ppo", "td3", "sac"]) -> None:
+    start = parent()
+    result = run(SHORT.model_copy(update={"algorithm": algorithm}), start)
+    assert result.reason == "finished"
+    assert result.steps == 128
+    assert result.policy.hidden_sizes == (32, 32)
+    for before, after in zip(start.weights, result.policy.weights, strict=True):
+        assert not np.array_equal(before, after)
+    assert (np.abs(result.policy.actions(SEEN) - start.actions(SEEN)).max(axis=0) > 1e-4).all()
+    assert result.curve
+    assert result.curve[-1].steps <= result.steps
+
+
+def test_equal_arguments_give_equal_weights_and_other_seeds_others() -> None:
+    first, again = run(SHORT, None), run(SHORT, None)
+    other = run(SHORT.model_copy(update={"seed": 1}), None)
+    for one, two, three in zip(
+        first.policy.weights, again.policy.weights, other.policy.weights, strict=True
+    ):
+        np.testing.assert_array_equal(one, two)
+        assert not np.array_equal(one, three)
+    assert first.curve == again.curve
+
+
+def test_a_new_critic_learns_alone_first() -> None:
+    start = parent()
+    result = run(SHORT.model_copy(update={"critic_share": 0.99}), start)
+    np.testing.assert_array_equal(result.policy.act(SEEN), start.act(SEEN))
+
+
+def test_a_passed_deadline_leaves_the_parent_as_it_is() -> None:
+    start = parent()
+    result = run(SHORT, start, stops=True)
+    assert result.reason == "deadline"
+    assert result.steps < 128
+    np.testing.assert_array_equal(result.policy.act(SEEN), start.act(SEEN))
+
+
+def test_presets_decide_what_a_policy_without_a_parent_is() -> None:
+    ours = run(SHORT.model_copy(update={"steps": 16}), None).policy
+    theirs = run(SHORT.model_copy(update={"steps": 16, "preset": "authors"}), None).policy
+    assert (ours.observation, ours.hidden_sizes) == (DEFAULT_OBSERVATION, (256, 256))
+    assert (theirs.observation, theirs.hidden_sizes) == (AUTHORS_OBSERVATION, (512, 512))
+
+
+def test_in_an_open_corridor_a_policy_learns_to_drive_faster() -> None:
+    start = parent()
+    settings = TrainingSettings(steps=3000, parallel_envs=30, learning_rate=1e-3, gamma=0.9)
+    result = run(settings, start)
+    speed = PARAMETER_NAMES.index("max_vel_x")
+    assert result.policy.act(SEEN)[:, speed].mean() > start.act(SEEN)[:, speed].mean() + 0.2
+    times = [point.mean_time_s for point in result.curve if point.mean_time_s is not None]
+    assert np.mean(times[-5:]) < 0.85 * np.mean(times[:5])
+
+
+def test_no_task_is_refused() -> None:
+    with pytest.raises(ValueError, match="found no task"):
+        train(
+            [],
+            parent=None,
+            settings=SHORT,
+            simulation=SimulationSettings(),
+            profile=JACKAL,
+        )
