@@ -53,16 +53,24 @@ _LEAPS = np.maximum(1, ((np.sqrt(np.arange(256)) - 0.75) / 1.4143).astype(np.int
 
 
 @compiled
+def inflation_cells(inflation_radius: float) -> int:
+    """Give the inflation radius in cells; 0.3 m are 6, whatever 0.3 / 0.05 rounds to."""
+    return math.ceil(inflation_radius / RESOLUTION_M - 1e-9)
+
+
+@compiled
 def inflation_costs(costs: Float32Array, inflation_radius: float, inscribed_radius: float) -> None:
     """Fill the cost (256,) of each squared distance [cells^2] to the nearest obstacle.
 
-    As costmap_2d: nothing beyond the inflation radius, not even the inscribed cost.
+    As costmap_2d: the inflation radius counts in whole cells, rounded up, and beyond it there is
+    nothing, not even the inscribed cost.
     """
+    reach = inflation_cells(inflation_radius)
     for squared in range(256):
         distance = RESOLUTION_M * math.sqrt(squared)
         if squared == 0:
             costs[squared] = LETHAL
-        elif squared == FAR or distance > inflation_radius:
+        elif squared == FAR or squared > reach * reach:
             costs[squared] = 0.0
         elif distance <= inscribed_radius:
             costs[squared] = INSCRIBED
@@ -86,9 +94,8 @@ def work_in_scan(
     A beam without a return neither marks nor clears. Only net changes count as changes: a mark
     that this scan would clear and set again was never gone.
 
-    Args:
-        hits: Working space for the cells of at least B hits.
-        clears_footprint: costmap_2d's `footprint_clearing_enabled`.
+    `hits` is working space for the cells of at least B hits; `clears_footprint` is costmap_2d's
+    `footprint_clearing_enabled`.
     """
     cosine, sine = math.cos(slot.yaw), math.sin(slot.yaw)
     column = (slot.x + cosine * robot.mount_x - sine * robot.mount_y - slot.map_x) / RESOLUTION_M
@@ -182,10 +189,10 @@ def _clear_footprint(slot: Slot, memory: Memory, robot: RobotModel) -> None:
 @compiled
 def is_inside(sides: FloatArray, x: float, y: float) -> bool:
     """Tell whether a point [m] in the robot's frame lies in a convex polygon (E, 3)."""
+    is_in = True
     for k in range(sides.shape[0]):
-        if sides[k, 0] * x + sides[k, 1] * y > sides[k, 2]:
-            return False
-    return True
+        is_in = is_in and sides[k, 0] * x + sides[k, 1] * y <= sides[k, 2]
+    return is_in
 
 
 @compiled

@@ -20,6 +20,7 @@ from ses_core.simulation.state import Int32Array, Memory, Scratch, Slot, UInt16A
 UNREACHED = np.uint16(65535)
 BLOCKED = np.uint16(65534)
 _DETOUR_CELLS = 20
+_PLAN_MARGIN_CELLS = 10
 
 IMPOSSIBLE = 65534
 """From this value on, no way leads there."""
@@ -33,15 +34,16 @@ def measure_distances(
 
     Cells with inscribed cost block the way, except under the robot itself. The plan counts up to
     where it leaves the window; its last point there is the local goal. The original counts over
-    the whole window. Here the search for the plan stays in the box that roll-outs can reach,
-    and the one for the goal ends once it is farther than that box's corners behind the robot:
-    what they leave out, only samples that turn their back on plan and goal could ask for.
+    the whole window. Here the search for the plan stays within 0.5 m of the box that roll-outs
+    can reach, so steps to the plan above 10 may come out too high; the one for the goal ends
+    once it is farther than that box's corners behind the robot.
     """
     path, goal = memory.path_steps[number], memory.goal_steps[number]
     queue, plan = scratch.queue[worker], memory.plans[number]
-    box = min(int(slot.rollout_reach / RESOLUTION_M) + 1, WINDOW_CELLS // 2)
+    box = int(slot.rollout_reach / RESOLUTION_M) + 1
     middle = WINDOW_CELLS // 2 + 1  # the robot's cell when the window was centred
-    low, high = max(middle - box, 1), min(middle + box, WINDOW_CELLS)
+    low = max(middle - box - _PLAN_MARGIN_CELLS, 1)
+    high = min(middle + box + _PLAN_MARGIN_CELLS, WINDOW_CELLS)
     _open_cells(memory.costs[number], memory.window_distances[number], goal)
     _open_footprint(slot, goal, robot)
     path[:] = BLOCKED
@@ -103,8 +105,7 @@ def _open_footprint(slot: Slot, steps: UInt16Array, robot: RobotModel) -> None:
 def _spread(steps: UInt16Array, queue: Int32Array, size: int, robot: int, beyond: int) -> None:
     """Search breadth first from the queued cells; `steps` is flat, with a blocked border.
 
-    Args:
-        robot: End so many steps `beyond` this cell, or never (-1).
+    The search ends so many steps `beyond` the cell `robot`, or never where that is -1.
     """
     head = 0
     while head < size:

@@ -9,7 +9,7 @@ episode that goes nowhere ends as stuck.
 import math
 
 from ses_core.compilation import compiled
-from ses_core.planning.trajectory_planner import SIM_TIME_S, rollout_cost
+from ses_core.planning.rollouts import HITS, SIM_TIME_S, rollout_cost
 from ses_core.simulation.robot import RobotModel
 from ses_core.simulation.state import Memory, Slot
 
@@ -54,4 +54,4 @@ def _turn_hits(slot: Slot, memory: Memory, number: int, robot: RobotModel) -> bo
     cost = rollout_cost(
         slot, memory, number, robot, 0.0, slot.recovery_angle / SIM_TIME_S, False, math.inf
     )
-    return cost == -1.0
+    return cost == HITS

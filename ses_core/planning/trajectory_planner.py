@@ -16,19 +16,17 @@ Simplified, and why:
 
 import math
 
-import numpy as np
-
-from ses_core.arrays import ByteArray, Float32Array, FloatArray
+from ses_core.arrays import FloatArray
 from ses_core.compilation import compiled
-from ses_core.planning.costmap import LETHAL, RESOLUTION_M, WINDOW_SIZE, window_place
+from ses_core.planning.costmap import RESOLUTION_M, WINDOW_SIZE, window_place
 from ses_core.planning.distance_maps import IMPOSSIBLE
+from ses_core.planning.rollouts import NO_WAY, SIM_TIME_S, rollout_cost
 from ses_core.simulation.robot import RobotModel, drive, wrap
 from ses_core.simulation.state import Memory, Scratch, Slot, UInt16Array
 
 MIN_VEL_X = 0.1
 MIN_IN_PLACE_VEL_THETA = 0.314
 ESCAPE_VEL = -0.5
-SIM_TIME_S = 2.0
 ESCAPE_REACH_M = -ESCAPE_VEL * SIM_TIME_S
 OCCDIST_SCALE = 0.1
 HEADING_LOOKAHEAD_M = 0.325
@@ -38,14 +36,8 @@ ESCAPE_RESET_RAD = 0.1
 """jackal_navigation's base_local_planner_params.yaml. `occdist_scale` multiplies raw costs, while
 the two biases are multiplied by the cell size (meter_scoring)."""
 
-ROLLOUT_STEP_M = 0.05
-
 MAX_VX_SAMPLES = 24
 MAX_VTHETA_SAMPLES = 64
-
-HITS = -1.0
-NO_WAY = -2.0
-"""Costs of a roll-out whose outline meets a lethal cell; that enters a cell no way leads from."""
 
 _MAX_VEL_X, _MAX_VEL_THETA, _VX_SAMPLES, _VTHETA_SAMPLES, _PATH_BIAS, _GOAL_BIAS = range(6)
 
@@ -74,9 +66,7 @@ def find_command(
 ) -> bool:
     """Set the slot's command to the best sample's velocities.
 
-    Args:
-        parameters: (7,) of this slot, in the order of `PARAMETER_NAMES`.
-        period: Control period [s].
+    The parameters (7,) are in the order of `PARAMETER_NAMES`, the period in s.
 
     Returns:
         Whether there is a valid command; without one the robot stops.
@@ -190,7 +180,7 @@ def _best_forward(
 def _end_cost(
     path: UInt16Array, goal: UInt16Array, x: float, y: float, parameters: FloatArray
 ) -> float:
-    """Give what a roll-out ending at (x, y) [cells] costs by path and goal; inf where it must not."""
+    """Give what ending at (x, y) [cells] costs by path and goal; inf where a sample must not."""
     if not (1.0 <= x < WINDOW_SIZE - 1.0 and 1.0 <= y < WINDOW_SIZE - 1.0):
         return math.inf
     column, row = int(x), int(y)
@@ -198,104 +188,6 @@ def _end_cost(
     if to_path >= IMPOSSIBLE or to_goal >= IMPOSSIBLE:
         return math.inf
     return RESOLUTION_M * (parameters[_PATH_BIAS] * to_path + parameters[_GOAL_BIAS] * to_goal)
-
-
-@compiled
-def rollout_cost(
-    slot: Slot,
-    memory: Memory,
-    number: int,
-    robot: RobotModel,
-    v: float,
-    w: float,
-    is_backwards: bool,
-    allowed: float,
-) -> float:
-    """Give the highest cost under the outline and the centre over a roll-out of 2 s.
-
-    Args:
-        is_backwards: From its end to its start: the same cost, and a collision is met sooner.
-            In the order of driving, the first reason decides between HITS and NO_WAY.
-        allowed: Stop once the cost exceeds this.
-
-    Returns:
-        A cost in [0, 253], HITS or NO_WAY.
-    """
-    distances, costs = memory.window_distances[number], memory.costs[number]
-    path, goal = memory.path_steps[number], memory.goal_steps[number]
-    centre_x, centre_y = window_place(slot, slot.x, slot.y)
-    farthest = max(abs(v), abs(w) * robot.circumscribed_radius) * SIM_TIME_S
-    steps = max(1, int(math.ceil(farthest / ROLLOUT_STEP_M)))
-    first_cosine, first_sine = math.cos(slot.yaw), math.sin(slot.yaw)
-    turned = w * SIM_TIME_S / steps
-    cosine, sine = first_cosine, first_sine
-    if is_backwards:
-        cosine = math.cos(slot.yaw + w * SIM_TIME_S)
-        sine = math.sin(slot.yaw + w * SIM_TIME_S)
-        turned = -turned
-    turn_cosine, turn_sine = math.cos(turned), math.sin(turned)
-    is_straight = abs(w) < 1e-6
-    radius = 0.0 if is_straight else v / w / RESOLUTION_M
-    stride = v * SIM_TIME_S / steps / RESOLUTION_M
-    harmless = _harmless_distance(slot, robot)
-    worst = 0.0
-    for k in range(steps + 1):
-        step = steps - k if is_backwards else k
-        if is_straight:
-            x, y = centre_x + step * stride * cosine, centre_y + step * stride * sine
-        else:
-            x = centre_x + radius * (sine - first_sine)
-            y = centre_y - radius * (cosine - first_cosine)
-        cost = _pose_cost(distances, costs, robot, x, y, cosine, sine, harmless)
-        if cost < 0.0:
-            return HITS
-        if path[int(y), int(x)] >= IMPOSSIBLE or goal[int(y), int(x)] >= IMPOSSIBLE:
-            return NO_WAY
-        worst = max(worst, cost)
-        if worst > allowed:
-            return worst
-        cosine, sine = (
-            cosine * turn_cosine - sine * turn_sine,
-            sine * turn_cosine + cosine * turn_sine,
-        )
-    return worst
-
-
-@compiled
-def _harmless_distance(slot: Slot, robot: RobotModel) -> int:
-    """Give the squared distance [cells^2] of the centre from which no outline cell has a cost."""
-    inflated = max(slot.inflation_radius, 0.0) + robot.circumscribed_radius
-    # Both the centre and the outline point may lie anywhere in their cells.
-    return int(math.ceil((inflated / RESOLUTION_M + math.sqrt(2.0)) ** 2))
-
-
-@compiled
-def _pose_cost(
-    distances: ByteArray,
-    costs: Float32Array,
-    robot: RobotModel,
-    x: float,
-    y: float,
-    cosine: float,
-    sine: float,
-    harmless: int,
-) -> float:
-    """Give the highest cost under the outline and the centre at a pose [cells], or HITS."""
-    rim = robot.circumscribed_radius / RESOLUTION_M + 1.0
-    if not (rim <= x < WINDOW_SIZE - rim and rim <= y < WINDOW_SIZE - rim):
-        return HITS
-    least = int(distances[int(y), int(x)])
-    if least >= harmless:
-        return 0.0
-    cosine, sine = cosine / RESOLUTION_M, sine / RESOLUTION_M
-    for k in range(robot.outline.shape[0]):
-        point_x = x + cosine * robot.outline[k, 0] - sine * robot.outline[k, 1]
-        point_y = y + sine * robot.outline[k, 0] + cosine * robot.outline[k, 1]
-        squared = int(distances[int(point_y), int(point_x)])
-        if squared == 0:
-            return HITS
-        least = min(least, squared)
-    return float(costs[least])
 
 
 @compiled

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from ses_core.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
@@ -97,7 +96,7 @@ class BatchSimulator:
                 f"reset of {len(slots)} slots got {len(tasks)} tasks and {len(seeds)} seeds, "
                 "expected as many of each"
             )
-        if len(slots) and not (0 <= min(slots) and max(slots) < self.slots):
+        if len(slots) and (min(slots) < 0 or max(slots) >= self.slots):
             raise ValueError(f"reset of slot {max(slots)}, expected 0 to {self.slots - 1}")
         for number, task, seed in zip(slots, tasks, seeds, strict=True):
             self._start(int(number), task, int(seed))

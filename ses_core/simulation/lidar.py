@@ -54,18 +54,17 @@ def cast(
 ) -> float:
     """Follow one ray to the face of the first occupied cell; all lengths in cells.
 
+    The grid has to be walled all round.
+
     From a cell at chessboard distance n the ray may advance n - 1 cells along its faster axis
     and meets nothing; next to an obstacle it goes from cell face to cell face (Amanatides and
     Woo 1987). The result is that of the plain walk.
-
-    Args:
-        along_x: Direction, of unit length; along_y likewise.
-        limit: Give up here.
+    The direction (along_x, along_y) has unit length.
 
     Returns:
-        The distance, or inf where nothing was hit; leaving the grid counts as a hit.
+        The distance, or inf where nothing was hit up to `limit`; leaving the grid is a hit.
     """
-    column, row = int(math.floor(x)), int(math.floor(y))
+    column, row = math.floor(x), math.floor(y)
     step_x, step_y = (1 if along_x > 0.0 else -1), (1 if along_y > 0.0 else -1)
     inverse_x = 1.0 / along_x if along_x != 0.0 else math.inf
     inverse_y = 1.0 / along_y if along_y != 0.0 else math.inf
@@ -80,8 +79,8 @@ def cast(
             return travelled
         if near > 2:
             travelled += (near - 1) * pace
-            column = int(math.floor(x + travelled * along_x))
-            row = int(math.floor(y + travelled * along_y))
+            column = math.floor(x + travelled * along_x)
+            row = math.floor(y + travelled * along_y)
             continue
         to_x = (column + face_x - x) * inverse_x if along_x != 0.0 else math.inf
         to_y = (row + face_y - y) * inverse_y if along_y != 0.0 else math.inf
@@ -111,10 +110,8 @@ def cast_scan(
 ) -> None:
     """Fill one noiseless scan (B,) [m] from a laser at (x, y, yaw) in the grid's frame [m, rad].
 
-    Readings outside [range_min, range_max] become inf, as where nothing was hit.
-
-    Args:
-        beams: (B, 2) unit vectors in the laser's frame.
+    Readings outside [range_min, range_max] become inf, as where nothing was hit. The beams (B, 2)
+    are unit vectors in the laser's frame.
     """
     cosine, sine = math.cos(yaw), math.sin(yaw)
     for beam in range(beams.shape[0]):

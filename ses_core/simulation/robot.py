@@ -150,11 +150,10 @@ def touches(
 ) -> bool:
     """Tell whether the bare body overlaps an occupied cell: separating axes, exact.
 
-    Args:
-        x: Position [m] from the lower left corner of the world; y likewise.
-        clearance: Chessboard distances of all worlds; this one begins at `offset`.
+    The position (x, y) [m] is from the world's lower left corner; `clearance` holds the
+    chessboard distances of all worlds, this one's from `offset` on.
     """
-    column, row = int(math.floor(x / resolution)), int(math.floor(y / resolution))
+    column, row = math.floor(x / resolution), math.floor(y / resolution)
     if not (0 <= column < width and 0 <= row < height):
         return True
     near = int(clearance[offset + row * width + column])
@@ -171,10 +170,10 @@ def touches(
         bottom, top = min(bottom, corner_y), max(top, corner_y)
     # The bounding box is the test along the cells' own axes.
     first_column, last_column = (
-        int(math.floor(left / resolution)),
-        int(math.floor(right / resolution)),
+        math.floor(left / resolution),
+        math.floor(right / resolution),
     )
-    first_row, last_row = int(math.floor(bottom / resolution)), int(math.floor(top / resolution))
+    first_row, last_row = math.floor(bottom / resolution), math.floor(top / resolution)
     if first_column < 0 or first_row < 0 or last_column >= width or last_row >= height:
         return True
     half = 0.5 * resolution

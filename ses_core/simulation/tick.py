@@ -21,11 +21,11 @@ from ses_core.planning.costmap import (
 from ses_core.planning.distance_maps import measure_distances
 from ses_core.planning.global_planner import update_plan
 from ses_core.planning.recovery import recover
+from ses_core.planning.rollouts import SIM_TIME_S
 from ses_core.planning.trajectory_planner import (
     ESCAPE_REACH_M,
     HEADING_LOOKAHEAD_M,
     MIN_VEL_X,
-    SIM_TIME_S,
     find_command,
 )
 from ses_core.settings import SimulationSettings
@@ -134,7 +134,7 @@ def sense(
         slot, memory, ranges, robot, scratch.queue[worker], clears_footprint=setup.clears_footprint
     )
     refresh_distances(slot, memory, scratch, worker)
-    update_plan(slot, memory, number, robot, scratch, worker, setup.plan_age)
+    update_plan(slot, memory, number, scratch, worker, setup.plan_age)
     centre_window(slot, memory, number)
     measure_distances(slot, memory, number, robot, scratch, worker)
 
@@ -156,7 +156,7 @@ def plan(
         slot.inflation_radius = parameters[_INFLATION_RADIUS]
         inflation_costs(memory.costs[number], slot.inflation_radius, robot.inscribed_radius)
         slot.search_needed = True
-        update_plan(slot, memory, number, robot, scratch, worker, setup.plan_age)
+        update_plan(slot, memory, number, scratch, worker, setup.plan_age)
     farthest = max(parameters[_MAX_VEL_X], MIN_VEL_X) * (
         SIM_TIME_S + setup.sense_every * setup.period
     )
@@ -206,7 +206,7 @@ def move(slot: Slot, memory: Memory, number: int, robot: RobotModel, setup: Cond
     v, w = 0.5 * (left + right), (right - left) / robot.track
     pieces = max(
         1,
-        int(math.ceil((abs(v) + abs(w) * robot.body_radius) * setup.period / _MOTION_STEP_M)),
+        math.ceil((abs(v) + abs(w) * robot.body_radius) * setup.period / _MOTION_STEP_M),
     )
     x, y, yaw = slot.x, slot.y, slot.yaw
     has_contact = False

@@ -10,6 +10,8 @@ from ses_core.occupancy import OccupancyGrid
 from ses_core.planning.costmap import MARGIN_M, RESOLUTION_M
 from ses_core.simulation.lidar import chessboard_clearance
 
+_IDLE_BYTES = 64 * 2**20
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PooledWorld:
@@ -28,12 +30,13 @@ class WorldPool:
     worlds: dict[int, PooledWorld] = field(default_factory=dict)
 
     def hold(self, grids: list[OccupancyGrid], kept: set[int]) -> None:
-        """Make room for the grids, dropping those that neither they nor `kept` name."""
+        """Make room for the grids; beyond 64 MiB those go that neither they nor `kept` name."""
         needed = kept | {id(grid.cells) for grid in grids}
-        if needed <= self.worlds.keys():
+        if all(id(grid.cells) in self.worlds for grid in grids):
             return
-        for key in self.worlds.keys() - needed:
-            del self.worlds[key]
+        if self.flat.size > _IDLE_BYTES:
+            for key in self.worlds.keys() - needed:
+                del self.worlds[key]
         for grid in grids:
             if id(grid.cells) not in self.worlds:
                 # One occupied cell all round: beyond the map is a wall.
