@@ -1,0 +1,104 @@
+"""What every simulator keeps: shapes, outcomes, seeds, and finished slots that stay as they are."""
+
+from collections.abc import Callable
+from dataclasses import astuple
+
+import numpy as np
+
+from ses_core.evaluation.outcomes import EpisodeOutcome
+from ses_core.geometry import Pose2D
+from ses_core.navigation import NavigationTask, World
+from ses_core.occupancy import OccupancyGrid
+from ses_core.planning.parameters import DWA_SLOW
+from ses_core.protocols import Simulator
+
+SECOND = 20
+
+
+def check_simulator(make: Callable[[int], Simulator], *, beams: int = 720) -> None:
+    """Hold the seam's promises against what `make(slots)` makes with default settings."""
+    _check_shapes(make(2), beams)
+    _check_a_straight_drive(make(1))
+    _check_same_seed_same_bytes(make)
+    _check_finished_slots_stay(make(2))
+
+
+def _task(length: float = 3.0) -> NavigationTask:
+    cells = np.zeros((40, 60), dtype=np.bool_)
+    cells[[0, -1], :] = True
+    cells[:, [0, -1]] = True
+    grid = OccupancyGrid(cells=cells, resolution=0.1, origin=(-1.0, -2.0))
+    world = World(world_id="open", grid=grid)
+    return NavigationTask(world=world, start=Pose2D(0.0, 0.0, 0.0), goal=(length, 0.0))
+
+
+def _parameters(simulator: Simulator) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.tile(DWA_SLOW.as_array(), (simulator.slots, 1))
+
+
+def _check_shapes(simulator: Simulator, beams: int) -> None:
+    simulator.reset(np.arange(2), [_task(), _task(2.5)], np.array([1, 2]))
+    simulator.advance(_parameters(simulator), 3)
+    assert simulator.slots == 2
+    assert simulator.time_step == 0.05
+    assert simulator.scans().shape == (2, beams)
+    state = simulator.state()
+    assert state.poses.shape == (2, 3)
+    for pairs in (state.velocities, state.commands, state.goals, state.local_goals):
+        assert pairs.shape == (2, 2)
+    for singles in (state.path_lengths, state.negative_counts, state.outcomes):
+        assert singles.shape == (2,)
+    np.testing.assert_allclose(state.times, [0.15, 0.15])
+    np.testing.assert_array_equal(state.goals, [[3.0, 0.0], [2.5, 0.0]])
+    state.poses[:] = 99.0
+    assert np.all(simulator.state().poses != 99.0)
+    simulator.close()
+
+
+def _check_a_straight_drive(simulator: Simulator) -> None:
+    simulator.reset(np.arange(1), [_task()], np.array([3]))
+    for _ in range(15):
+        simulator.advance(_parameters(simulator), SECOND)
+    state = simulator.state()
+    assert state.outcomes.tolist() == [EpisodeOutcome.SUCCESS]
+    assert 1.9 < state.path_lengths[0] < 2.2
+    assert 4.0 < state.times[0] < 6.0
+    assert state.negative_counts.tolist() == [0]
+    np.testing.assert_allclose(state.poses[0], [2.0, 0.0, 0.0], atol=0.15)
+    simulator.close()
+
+
+def _check_same_seed_same_bytes(make: Callable[[int], Simulator]) -> None:
+    alone, twice, other = make(1), make(2), make(1)
+    alone.reset(np.arange(1), [_task()], np.array([7]))
+    twice.reset(np.array([1]), [_task()], np.array([7]))
+    twice.reset(np.array([0]), [_task(2.0)], np.array([8]))
+    other.reset(np.arange(1), [_task()], np.array([9]))
+    for simulator in (alone, twice, other):
+        simulator.advance(_parameters(simulator), 2 * SECOND)
+    assert alone.scans()[0].tobytes() == twice.scans()[1].tobytes()
+    assert alone.state().poses[0].tobytes() == twice.state().poses[1].tobytes()
+    assert alone.state().poses[0].tobytes() != other.state().poses[0].tobytes()
+    for simulator in (alone, twice, other):
+        simulator.close()
+
+
+def _check_finished_slots_stay(simulator: Simulator) -> None:
+    simulator.reset(np.arange(2), [_task(1.05), _task()], np.array([1, 2]))
+    simulator.advance(_parameters(simulator), SECOND)
+    ended = simulator.state()
+    assert ended.outcomes.tolist() == [EpisodeOutcome.SUCCESS, EpisodeOutcome.RUNNING]
+    simulator.advance(_parameters(simulator), SECOND)
+    later = simulator.state()
+    for before, after in zip(_columns(ended), _columns(later), strict=True):
+        np.testing.assert_array_equal(before[0], after[0])
+    assert later.path_lengths[1] > ended.path_lengths[1]
+    simulator.reset(np.array([0]), [_task()], np.array([1]))
+    assert simulator.state().outcomes.tolist() == [EpisodeOutcome.RUNNING] * 2
+    assert simulator.state().times[0] == 0.0
+    assert simulator.state().times[1] == later.times[1]
+    simulator.close()
+
+
+def _columns(state: object) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.generic]], ...]:
+    return astuple(state)  # type: ignore[call-overload]  # every simulator's state is a dataclass
