@@ -25,6 +25,7 @@ from storage.durable_files import (
     temporary_name,
     write_if_absent,
 )
+from storage.file_lock import file_lock
 from storage.layout import Layout, open_layout
 from storage.object_files import (
     FileDroppedError,
@@ -103,12 +104,11 @@ class LocalArtifactStore:
                 build(staging)
             with disk_errors(staging):
                 ref = ArtifactRef(recipe.stage.name, seal_object(staging))
-                self._place(staging, ref)
-            ref = self._commit(recipe, ref, time.perf_counter() - started)
+                with file_lock(self._layout.sweep_lock, shared=True):
+                    self._place(staging, ref)
+            return self._commit(recipe, ref, time.perf_counter() - started)
         finally:
             shutil.rmtree(staging, ignore_errors=True)
-        # Garbage collection may have taken an old artifact without recipe just before it got one.
-        return ref if self._layout.object_folder(ref).exists() else self.put(recipe, build)
 
     def path(self, ref: ArtifactRef) -> Path:
         """Give the folder of an artifact, checked against its digest.
@@ -191,7 +191,11 @@ class LocalArtifactStore:
         self._checked[ref, file.path] = signature
 
     def _place(self, staging: Path, ref: ArtifactRef) -> None:
-        """Give a sealed folder its name, unless the same content already has it."""
+        """Give a sealed folder its name, unless the same content already has it.
+
+        Either way the artifact is young afterwards, so that it is not collected as one that
+        nothing leads to before its recipe does.
+        """
         target = self._layout.object_folder(ref)
         make_folder(target.parent)
         while True:
@@ -203,10 +207,14 @@ class LocalArtifactStore:
             else:
                 sync_folder(target.parent)
                 return
-            with suppress(ArtifactError, FileNotFoundError):
+            try:
                 self._check(ref, contents=True)
-                os.utime(target)  # Young again: garbage collection leaves it alone.
-                return
+            except ArtifactError:
+                if target.exists():
+                    raise
+                continue  # It was damaged and has been moved away: its place is free.
+            os.utime(target)
+            return
 
     def _commit(self, recipe: Recipe, ref: ArtifactRef, seconds: float) -> ArtifactRef:
         """Link the recipe to its artifact: from here on it is answered."""

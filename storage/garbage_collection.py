@@ -9,7 +9,6 @@ again.
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -19,6 +18,7 @@ from ses_core.recipes import ArtifactRef
 from ses_core.settings import StoreSettings
 from storage.artifact_store import read_answer
 from storage.durable_files import disk_errors, temporary_name, temporary_owner
+from storage.file_lock import file_lock
 from storage.layout import Layout
 from storage.object_files import drop_files
 from storage.policy_registry import PolicyRegistry
@@ -88,17 +88,20 @@ def stray_temporaries(layout: Layout, now: datetime) -> Iterator[Path]:
     for walked, names, files in os.walk(layout.root):
         if Path(walked) in (layout.objects, layout.corrupt, layout.prefect):
             names.clear()
-        for name in [*names, *files]:
-            path = Path(walked, name)
-            owner = temporary_owner(path)
-            if owner is not None and (not _is_alive(owner) or _age(path, now) > _MAX_TEMPORARY_AGE):
-                yield path
+        yield from (path for name in [*names, *files] if _is_stray(path := Path(walked, name), now))
         # What lies in a half-built folder goes with it.
         names[:] = [name for name in names if temporary_owner(Path(name)) is None]
+    # Artifacts are not walked: only their own notes are ever written again.
+    yield from (path for path in layout.objects.glob("*/*/.*") if _is_stray(path, now))
     for folder in (layout.staging, layout.temporary):
         for path in folder.glob("*"):
             if temporary_owner(path) is None and _age(path, now) > _MAX_TEMPORARY_AGE:
                 yield path
+
+
+def _is_stray(path: Path, now: datetime) -> bool:
+    owner = temporary_owner(path)
+    return owner is not None and (not _is_alive(owner) or _age(path, now) > _MAX_TEMPORARY_AGE)
 
 
 def _sweep_temporaries(layout: Layout, now: datetime) -> tuple[int, int]:
@@ -161,28 +164,22 @@ def _sweep_objects(layout: Layout, needed: set[ArtifactRef], before: datetime) -
         ref = ArtifactRef(folder.parent.name, folder.name)
         if ref in needed or not _is_older(folder, before):
             continue
-        # A writer that finds this artifact just now makes it young again before its recipe
-        # leads to it: so it is taken out of sight first, and put back if that happened.
         hidden = temporary_name(layout.staging / ref.digest)
-        with suppress(FileNotFoundError):
+        # A writer that makes the same artifact anew makes it young under this lock.
+        with file_lock(layout.sweep_lock):
+            if not _is_older(folder, before):
+                continue
             folder.rename(hidden)
-            if _is_older(hidden, before):
-                freed += _remove(hidden)
-                count += 1
-            else:
-                _put_back(hidden, folder)
+        freed += _remove(hidden)
+        count += 1
     return count, freed
 
 
-def _put_back(hidden: Path, folder: Path) -> None:
-    try:
-        hidden.rename(folder)
-    except OSError:
-        _remove(hidden)  # The writer has put its own copy there already.
-
-
 def _is_older(path: Path, before: datetime) -> bool:
-    return path.stat().st_mtime < before.timestamp()
+    try:
+        return path.stat().st_mtime < before.timestamp()
+    except FileNotFoundError:
+        return False
 
 
 def _age(path: Path, now: datetime) -> timedelta:

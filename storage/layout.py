@@ -30,6 +30,16 @@ class Layout:
         return self.root / ".lock"
 
     @property
+    def publish_lock(self) -> Path:
+        """Held by the one process that brings `tables` up to date."""
+        return self.root / ".publish.lock"
+
+    @property
+    def sweep_lock(self) -> Path:
+        """Held by whoever takes artifacts away; shared by those that put them in place."""
+        return self.root / ".sweep.lock"
+
+    @property
     def objects(self) -> Path:
         """Artifacts, immutable, named by their content."""
         return self.root / "objects"

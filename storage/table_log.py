@@ -4,17 +4,15 @@ The entries are the truth; the folders under `tables/` are a view of them that i
 to date after every commit and whenever the log is opened, so that a crash in between heals.
 """
 
-import fcntl
-import os
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
 
 from ses_core.errors import ArtifactError
 from ses_core.recipes import JsonValue
-from storage.durable_files import disk_errors, replace_file
+from storage.durable_files import replace_file
+from storage.file_lock import file_lock
 from storage.layout import Layout
 from storage.numbered_log import NO_ENTRY, LogEntry, NumberedLog
 from storage.sealed_json import seal, unseal
@@ -96,7 +94,7 @@ class TableLog:
         published = None if anew else self._view.published()
         if published is not None and self._log.read(published + 1) is None:
             return
-        with _locked(self._layout.table_log / ".publish.lock"):
+        with file_lock(self._layout.publish_lock):
             # Another process may have published in the meantime.
             published = None if anew else self._view.published()
             changes: dict[str, TablePart | None] = {}
@@ -134,7 +132,7 @@ class TableLog:
             if self._parts.get(part.slot) == part and not self._view.shows(part)
         }
         if hidden:
-            with _locked(self._layout.table_log / ".publish.lock"):
+            with file_lock(self._layout.publish_lock):
                 self._view.apply(hidden, number=self._view.published() or 0)
 
     def _check_source(self, part: TablePart) -> None:
@@ -175,15 +173,3 @@ def _changes(entry: LogEntry) -> dict[str, TablePart | None]:
     changes: dict[str, TablePart | None] = dict.fromkeys(removed)
     changes.update((part.slot, part) for part in map(part_from_json, added))
     return changes
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Hold a lock that the kernel frees when its holder dies."""
-    with disk_errors(path):
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)

@@ -38,7 +38,7 @@ class TablePart:
     folder: str = ""
 
     def __post_init__(self) -> None:
-        for text in filter(None, (self.name, self.folder)):
+        for text in (self.name, self.folder or "flat"):
             if not _PLAIN_NAME.fullmatch(text):
                 raise ValueError(f"part is called {text!r}, expected letters, digits, '.' and '-'")
 
