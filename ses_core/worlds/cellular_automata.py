@@ -130,26 +130,10 @@ def cross_field(field: BoolArray, *, rng: Generator) -> IntArray | None:
         return None
     start = int(rng.choice(np.flatnonzero(regions[:, 0] == start_region)))
     goal = int(rng.choice(np.flatnonzero(regions[:, -1] == goal_region)))
-    return _smooth_path(blocked, (start, 0), (goal, FIELD_CELLS - 1))
+    return smooth_path(blocked, (start, 0), (goal, FIELD_CELLS - 1))
 
 
-def barn_course(field: BoolArray) -> OccupancyGrid:
-    """Stand a field (30, 30) behind BARN's corridor, with 4.5 m of open ground past it."""
-    cells = np.zeros(COURSE_SHAPE, dtype=np.bool_)
-    cells[0] = True
-    cells[:_CORRIDOR_CELLS, [0, -1]] = True
-    cells[_CORRIDOR_CELLS : _CORRIDOR_CELLS + FIELD_CELLS] = field.T
-    return OccupancyGrid(cells=cells, resolution=CELL_M, origin=COURSE_ORIGIN)
-
-
-def _main_region(column: IntArray) -> int:
-    """Label of the region with most cells in a column, 0 if all of it is blocked."""
-    sizes = np.bincount(column)
-    sizes[0] = 0
-    return int(sizes.argmax())
-
-
-def _smooth_path(
+def smooth_path(
     blocked: BoolArray, start: tuple[int, int], goal: tuple[int, int]
 ) -> IntArray | None:
     """Search for the cheapest path that turns by at most 45 degrees per cell.
@@ -189,6 +173,22 @@ def _smooth_path(
         path.append(divmod(state % size, FIELD_CELLS))
         state = int(predecessors[state])
     return np.array(path[::-1], dtype=np.int64)
+
+
+def barn_course(field: BoolArray) -> OccupancyGrid:
+    """Stand a field (30, 30) behind BARN's corridor, with 4.5 m of open ground past it."""
+    cells = np.zeros(COURSE_SHAPE, dtype=np.bool_)
+    cells[0] = True
+    cells[:_CORRIDOR_CELLS, [0, -1]] = True
+    cells[_CORRIDOR_CELLS : _CORRIDOR_CELLS + FIELD_CELLS] = field.T
+    return OccupancyGrid(cells=cells, resolution=CELL_M, origin=COURSE_ORIGIN)
+
+
+def _main_region(column: IntArray) -> int:
+    """Label of the region with most cells in a column, 0 if all of it is blocked."""
+    sizes = np.bincount(column)
+    sizes[0] = 0
+    return int(sizes.argmax())
 
 
 def _neighbours(cells: IntArray, down: int, right: int) -> tuple[IntArray, IntArray]:

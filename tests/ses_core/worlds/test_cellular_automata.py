@@ -13,6 +13,7 @@ from ses_core.worlds.cellular_automata import (
     generate_barn,
     generate_barn_world,
     grow_field,
+    smooth_path,
 )
 
 
@@ -87,6 +88,20 @@ def test_a_field_with_a_wall_across_cannot_be_crossed() -> None:
     assert cross_field(field, rng=np.random.default_rng(0)) is not None
     field[10, 15] = True
     assert cross_field(field, rng=np.random.default_rng(0)) is None
+
+
+def test_a_path_turns_by_at_most_45_degrees_per_cell() -> None:
+    blocked = np.ones((30, 30), dtype=np.bool_)
+    blocked[5, :10] = blocked[7, :10] = False
+    # One cell joins the two lanes: whoever turns back in it turns by 90 degrees at once.
+    blocked[6, 10] = False
+    assert smooth_path(blocked, (5, 0), (7, 0)) is None
+    # A room at the end of the lanes is wide enough to turn in steps of 45 degrees.
+    blocked[5:9, 10:13] = False
+    path = smooth_path(blocked, (5, 0), (7, 0))
+    assert path is not None
+    assert path[0].tolist() == [5, 0]
+    assert path[-1].tolist() == [7, 0]
 
 
 def test_a_course_is_a_walled_corridor_a_field_and_open_ground() -> None:

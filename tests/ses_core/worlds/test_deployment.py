@@ -62,6 +62,19 @@ def test_records_fit_together_step_by_step() -> None:
     assert deployment.commands[:, 0].max() == pytest.approx(0.5, abs=1e-6)
 
 
+def test_a_command_reaches_the_wheels_after_its_delay() -> None:
+    (deployment,) = deploy(
+        [_task(3.0)],
+        SLOW,
+        seed=0,
+        simulation=SimulationSettings(actuation_noise=0.0, command_delay_ticks=1),
+        profile=JACKAL,
+    )
+    # Command k, given at step k, drives the robot from step k + 1 to step k + 2.
+    assert np.allclose(deployment.measured[2:], deployment.commands[:-1], atol=1e-6)
+    assert np.ptp(deployment.commands[:, 1]) > 0.1
+
+
 def test_scans_belong_to_the_poses_they_are_stored_with() -> None:
     deployment = _deploy(3)[1]
     middle = 360  # the beam straight ahead, to within half a beam
