@@ -50,6 +50,7 @@ def store(tmp_path: Path) -> Path:
         ("status --bogus", "--bogus", "one of its options"),
         ("status --root", "no value", "a path"),
         ("status --root /none", "no store at /none", "ses nightly"),
+        ("bench nothing", "'nothing'", "increment"),
         ("verify now", "'now'", "nothing more"),
         ("worlds", "no command", "generate, import, show"),
         ("worlds import /none --out x", "nothing at /none", "a file or folder"),
