@@ -13,6 +13,7 @@ from ses_core.robot_profile import JACKAL, TURTLEBOT4, RobotProfile
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.bullet import BulletSimulator, PhysicalSlot
 from ses_core.simulation.rendering import render
+from tests.contracts.simulator import check_simulator
 
 CALM = SimulationSettings(actuation_noise=0.0, range_noise_m=0.0)
 PARAMETERS = DWA_SLOW.as_array()
@@ -96,6 +97,12 @@ def _simulate(
     simulator.reset(np.arange(len(tasks)), tasks, np.arange(len(tasks)))
     simulator.advance(np.tile(PARAMETERS, (len(tasks), 1)), seconds * 20)
     return simulator
+
+
+def test_it_keeps_the_promises_of_the_seam() -> None:
+    check_simulator(
+        lambda slots: BulletSimulator(slots=slots, profile=JACKAL, settings=SimulationSettings())
+    )
 
 
 def test_robots_drive_through_a_hall_to_the_goal() -> None:
