@@ -24,7 +24,7 @@ from tests.storage.sample_tables import commit_sample
 ROOT = Path(__file__).parents[2]
 KILLED = -signal.SIGKILL
 REFUSED = 3
-KILLS = 5
+KILLS = 4
 
 
 def disturbed_runs(fate: str, work: str, folder: Path, stride: int) -> list[dict[str, object]]:

@@ -16,6 +16,7 @@ from ses_core.recipes import Recipe, Stage
 from ses_core.settings import StoreSettings
 from storage.artifact_store import LocalArtifactStore
 from storage.durable_files import temporary_name
+from storage.file_lock import file_lock
 from storage.garbage_collection import Collected, collect_garbage
 from storage.materialize import materialize
 from storage.policy_registry import PolicyRegistry
@@ -141,6 +142,19 @@ def test_a_damaged_log_stops_the_collection_before_anything_goes(
     with pytest.raises(ArtifactError, match="damaged"):
         collect(store, in_days=9)
     assert len(list(store.layout.objects.glob("*/*"))) == 1
+
+
+def test_no_artifact_is_put_in_place_while_others_are_taken_away(
+    store: LocalArtifactStore,
+) -> None:
+    thread = threading.Thread(target=store.put, args=(Recipe(INGEST), text("waits")))
+    with file_lock(store.layout.sweep_lock):
+        thread.start()
+        thread.join(timeout=0.5)
+        assert store.find(Recipe(INGEST)) is None
+        assert list(store.layout.objects.glob("*/*")) == []
+    thread.join()
+    assert store.find(Recipe(INGEST)) is not None
 
 
 def test_collecting_without_end_disturbs_neither_readers_nor_writers(
