@@ -24,8 +24,8 @@ from ses_core.learning.policies import ParameterPolicy
 from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.settings import TrainingSettings
 
-_ROLLOUT = 32
-"""Decisions of each robot between two updates of PPO: about one episode and a half."""
+_ROLLOUT = 1024
+"""Decisions of all robots together between two updates of PPO."""
 
 _MINIBATCHES, _EPOCHS = 8, 10
 """Of PPO per rollout: many, for a decision costs more to simulate than to learn from."""
@@ -143,21 +143,21 @@ def _make_ppo(
     env: VecEnv, hidden: list[int], settings: TrainingSettings, log_deviation: float
 ) -> tuple[PPO, int]:
     """Make PPO, whose rollouts are cut so that they make up the decisions asked for."""
-    rollouts = max(1, settings.steps // (_ROLLOUT * env.num_envs))
+    rollouts = max(1, settings.steps // max(_ROLLOUT, 8 * env.num_envs))
     length = max(2, settings.steps // (env.num_envs * rollouts))
-    if length > _MINIBATCHES:
-        length -= length % _MINIBATCHES
-    minibatches = max(1, min(_MINIBATCHES, length * env.num_envs // _LEAST_BATCH))
+    transitions = length * env.num_envs
+    most = max(1, min(_MINIBATCHES, transitions // _LEAST_BATCH))
+    minibatches = next(count for count in range(most, 0, -1) if transitions % count == 0)
     first_rate = settings.learning_rate or 3e-4
     learner = PPO(
         _SquashedMeanPolicy,
         env,
         learning_rate=lambda remaining: first_rate * (0.1 + 0.9 * remaining),
         n_steps=length,
-        batch_size=math.ceil(length * env.num_envs / minibatches),
+        batch_size=transitions // minibatches,
         n_epochs=_EPOCHS,
         gamma=settings.gamma,
-        target_kl=0.03,
+        target_kl=0.1,
         policy_kwargs={
             "net_arch": {"pi": hidden, "vf": hidden},
             "activation_fn": nn.ReLU,
@@ -166,7 +166,7 @@ def _make_ppo(
         seed=settings.seed,
         device="cpu",
     )
-    return learner, rollouts * length * env.num_envs
+    return learner, rollouts * transitions
 
 
 def _make_td3(

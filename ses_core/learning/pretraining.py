@@ -23,7 +23,7 @@ HELD_OUT_EVERY = 6
 WORLD_SEED = 20_211_001
 """Seed of those worlds."""
 
-PRETRAINING = TrainingSettings(steps=60_000, parallel_envs=50)
+PRETRAINING = TrainingSettings(steps=100_000, parallel_envs=50)
 """Settings of the shipped original policy."""
 
 PRETRAINING_SIMULATION = SimulationSettings(sensing_rate_hz=2.5)

@@ -75,8 +75,7 @@ def draw_worlds(episodes: Sequence[Episode], *, theme: Theme = LIGHT) -> bytes:
     for row, policy in enumerate(policies):
         axes.plot(
             rates[row, order],
-            "osD^vP"[row % 6],
-            ls="-",
+            marker="osD^vP"[row % 6],
             lw=0.8,
             ms=4,
             color=theme.series[row % len(theme.series)],
@@ -90,7 +89,13 @@ def draw_worlds(episodes: Sequence[Episode], *, theme: Theme = LIGHT) -> bytes:
         axes.set_xticks(
             range(len(worlds)), [worlds[number] for number in order], rotation=90, fontsize=7
         )
-    axes.legend(frameon=False, fontsize=9, labelcolor=theme.ink, ncols=min(4, len(policies)))
+    figure.legend(
+        loc="outside upper left",
+        frameon=False,
+        fontsize=9,
+        labelcolor=theme.ink,
+        ncols=min(4, len(policies)),
+    )
     return png_bytes(figure)
 
 

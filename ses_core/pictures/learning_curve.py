@@ -17,33 +17,29 @@ def draw_learning_curve(curve: Sequence[CurvePoint], *, theme: Theme = LIGHT) ->
     figure = new_figure(8.0, 3.0, theme=theme)
     success, time = figure.subplots(1, 2)
     steps = [point.steps for point in curve]
-    marker = "o" if len(curve) < 10 else ""
+    marker = "o" if len(curve) < 10 else None
     success.plot(
         steps,
         [100.0 * point.success_rate for point in curve],
-        marker,
-        ls="-",
+        marker=marker,
         color=theme.series[0],
         label="success",
     )
     success.plot(
         steps,
         [100.0 * point.collision_rate for point in curve],
-        marker,
-        ls="-",
+        marker=marker,
         color=theme.series[1],
         label="collision",
     )
     success.set_ylim(0.0, 100.0)
     success.set_ylabel("training episodes [%]")
-    legend = success.legend(frameon=False, fontsize=9, labelcolor=theme.ink)
-    legend.set_in_layout(True)
+    success.legend(frameon=False, fontsize=9, labelcolor=theme.ink)
     timed = [(point.steps, point.mean_time_s) for point in curve if point.mean_time_s is not None]
     time.plot(
         [step for step, _ in timed],
         [seconds for _, seconds in timed],
-        marker,
-        ls="-",
+        marker=marker,
         color=theme.series[2],
     )
     time.set_ylim(bottom=0.0)
