@@ -63,7 +63,7 @@ def test_the_robot_turns_in_place_towards_a_goal_behind_it() -> None:
 
 def _clutter(seed: int) -> Kernel:
     rng = np.random.default_rng(seed)
-    cells = hall() | (rng.random((50, 90)) < 0.04)
+    cells = hall() | (rng.random((50, 90)) < rng.uniform(0.002, 0.03))
     cells[20:31, 5:16] = False
     k = planned(course(cells), DWA_FAST)
     put(k.slot, v=float(rng.uniform(0.0, 1.0)), w=float(rng.uniform(-1.0, 1.0)))
@@ -96,8 +96,8 @@ def _all_costs(k: Kernel, v: float, w: float) -> float:
     return worst
 
 
-@settings(deadline=None, max_examples=40)
-@given(st.integers(0, 30), st.floats(0.1, 1.0), st.floats(-1.5, 1.5), st.booleans())
+@settings(deadline=None, max_examples=150)
+@given(st.integers(0, 30), st.floats(-1.0, 1.0), st.floats(-1.5, 1.5), st.booleans())
 def test_roll_outs_cost_what_their_worst_point_costs(
     seed: int, v: float, w: float, is_backwards: bool
 ) -> None:
@@ -119,7 +119,7 @@ def _is_on_an_edge(k: Kernel, v: float, w: float, found: float) -> bool:
     )
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(25))
 def test_the_pruned_search_finds_what_trying_every_sample_in_order_finds(seed: int) -> None:
     k = _clutter(seed)
     chosen = DWA_FAST.as_array()
