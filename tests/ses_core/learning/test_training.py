@@ -8,7 +8,6 @@ import pytest
 from ses_core.learning.observation import AUTHORS_OBSERVATION, DEFAULT_OBSERVATION
 from ses_core.learning.policies import ParameterPolicy, random_policy
 from ses_core.learning.training import TrainingResult, train
-from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.robot_profile import JACKAL
 from ses_core.settings import SimulationSettings, TrainingSettings
 from tests.ses_core.learning.places import corridor
@@ -78,16 +77,6 @@ def test_presets_decide_what_a_policy_without_a_parent_is() -> None:
     theirs = run(SHORT.model_copy(update={"steps": 16, "preset": "authors"}), None).policy
     assert (ours.observation, ours.hidden_sizes) == (DEFAULT_OBSERVATION, (256, 256))
     assert (theirs.observation, theirs.hidden_sizes) == (AUTHORS_OBSERVATION, (512, 512))
-
-
-def test_in_an_open_corridor_a_policy_learns_to_drive_faster() -> None:
-    start = parent()
-    settings = TrainingSettings(steps=3000, parallel_envs=30, learning_rate=1e-3, gamma=0.9)
-    result = run(settings, start)
-    speed = PARAMETER_NAMES.index("max_vel_x")
-    assert result.policy.act(SEEN)[:, speed].mean() > start.act(SEEN)[:, speed].mean() + 0.2
-    times = [point.mean_time_s for point in result.curve if point.mean_time_s is not None]
-    assert np.mean(times[-5:]) < 0.85 * np.mean(times[:5])
 
 
 def test_no_task_is_refused() -> None:
