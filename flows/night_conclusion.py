@@ -37,7 +37,11 @@ def made_nothing(
         scenarios, challenging = funnel.scenarios, funnel.challenging
         usable, pool = funnel.usable, funnel.pool
     decision = decide_without_training(
-        scenarios=scenarios, challenging=challenging, usable=usable, pool=pool
+        scenarios=scenarios,
+        challenging=challenging,
+        usable=usable,
+        pool=pool,
+        least_pool=night.settings.synthesis.least_pool,
     )
     return _artifacts(night, run_id, day, parent, decision, selection=selection)
 

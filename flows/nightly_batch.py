@@ -90,7 +90,7 @@ def learn(
     if not extracted:
         return made_nothing(night, run_id, day=day, parent=parent)
     selection_ref, selection = select_places(night, extracted, day=day)
-    if selection.pool.empty:
+    if len(selection.pool) < night.settings.synthesis.least_pool:
         return made_nothing(night, run_id, day=day, parent=parent, selection=selection_ref)
     environments, worlds = synthesize_environments(night, selection_ref)
     if not night.summary.environments:

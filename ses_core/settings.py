@@ -175,6 +175,12 @@ class SynthesisSettings(SettingsModel):
 
     synthesizer: SynthesizerSettings = Field(GanSettings(), description="How they are made.")
     environments: int = Field(100, ge=1, description="M: environments to train in.")
+    least_pool: int = Field(
+        10,
+        ge=1,
+        description="With fewer challenging environments a night trains nothing: that would "
+        "teach those few places by heart.",
+    )
     attempts: int = Field(
         20, ge=1, description="Most samples drawn per environment that can be crossed."
     )

@@ -75,7 +75,11 @@ def write_selection(directory: Path, selection: Selection, environments: pd.Data
     for folder, chosen in ((POOL_FOLDER, selection.pool), (HELDOUT_FOLDER, selection.heldout)):
         (directory / folder).mkdir()
         picked = rows.loc[chosen["environment_id"]]
-        columns = {name: picked[name].to_list() for name in picked.columns}
+        # pandas opens an absent text as NaN, which no column of text takes.
+        columns = {
+            name: picked[name].astype(object).where(picked[name].notna(), None).to_list()
+            for name in picked.columns
+        }
         write_table(directory / folder / ENVIRONMENTS_FILE, "environments", columns)
 
 

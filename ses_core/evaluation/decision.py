@@ -18,10 +18,10 @@ NOT_PROMOTED = "Nothing was promoted: a night reports, and the deployed policy s
 
 
 def decide_without_training(
-    *, scenarios: int, challenging: int, usable: int, pool: int
+    *, scenarios: int, challenging: int, usable: int, pool: int, least_pool: int
 ) -> NightDecision:
-    """Say why there was nothing to train in: the first step of the funnel that left nothing."""
-    if pool:
+    """Say why nothing was trained: the first step of the funnel that left too little."""
+    if pool >= least_pool:
         reason = f"Nothing synthesized from {pool} places can be crossed by the target robot."
     elif not scenarios:
         reason = "The logs hold no scenario: no robot got 5 m away from where it began."
@@ -31,6 +31,11 @@ def decide_without_training(
         reason = (
             f"Of {scenarios} scenarios {challenging} are challenging, but no rebuilt place of "
             "these can be used."
+        )
+    elif pool:
+        reason = (
+            f"Of {scenarios} scenarios {challenging} are challenging, and {pool} of their places "
+            f"can be learned from: fewer than {least_pool}, which would be learned by heart."
         )
     else:
         reason = (
