@@ -68,6 +68,10 @@ class TrainingMonitor(BaseCallback):
             self.reason = "deadline"
         return self.reason == "finished"
 
+    def _on_training_end(self) -> None:
+        if self._finished:
+            self._add_point()
+
     def _add_point(self) -> None:
         outcomes = np.array([info["outcome"] for info in self._finished])
         times = np.array([info["episode"]["t"] for info in self._finished])

@@ -13,7 +13,7 @@ from ses_core.learning.policies import random_policy
 from ses_core.learning.training_monitor import TrainingMonitor
 from ses_core.settings import TrainingSettings
 
-STEPS, ROBOTS = 8000, 50
+STEPS, ROBOTS = 8192, 32
 
 
 class Scripted(gymnasium.Env[Float32Array, Float32Array]):
@@ -77,10 +77,10 @@ def test_a_training_that_goes_well_runs_to_its_end() -> None:
 
 
 def test_a_collapse_ends_the_training_after_two_bad_stretches() -> None:
-    monitor, _, steps = watch(4000)
+    monitor, _, steps = watch(4096)
     assert monitor.reason == "diverged"
     assert monitor.best is not None
-    assert steps == pytest.approx(4000 + 2 * STEPS / 50, abs=4 * ROBOTS)
+    assert steps == pytest.approx(4096 + 2 * STEPS / 50, abs=6 * ROBOTS)
     assert monitor.curve[-1].success_rate == 0.0
     assert monitor.curve[-1].mean_time_s is None
 
