@@ -1,11 +1,10 @@
-"""The original policy: trained from nothing on worlds of BARN's generator (section IV-A)."""
+"""What the original policy is trained in, and how: worlds of BARN's generator (section IV-A)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
-from ses_core.learning.training import TrainingResult, train
 from ses_core.navigation import NavigationTask, World
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings, TrainingSettings
@@ -54,37 +53,3 @@ def training_tasks(
     return [
         task for world in worlds for task in sample_tasks(world, pairs, profile=profile, rng=rng)
     ]
-
-
-def pretrain(
-    worlds: Sequence[World] | None = None,
-    *,
-    settings: TrainingSettings = PRETRAINING,
-    simulation: SimulationSettings = PRETRAINING_SIMULATION,
-    profile: RobotProfile,
-    progress: Callable[[float], None] = lambda _: None,
-    deadline: Callable[[], bool] = lambda: False,
-) -> TrainingResult:
-    """Train a policy from random weights.
-
-    Args:
-        worlds: Where it is trained; by default the 250 generated training worlds.
-        settings: Algorithm, decisions, seed.
-        simulation: Rates and imperfections of the robot.
-        profile: The robot.
-        progress: Hears the share that is done, from 0 to 1.
-        deadline: Asked after every second of driving; the training ends when it says yes.
-
-    Raises:
-        ValueError: There is no world, or no world has room for a task.
-    """
-    chosen = generated_worlds("train") if worlds is None else worlds
-    return train(
-        training_tasks(chosen, profile=profile, seed=settings.seed),
-        parent=None,
-        settings=settings,
-        simulation=simulation,
-        profile=profile,
-        progress=progress,
-        deadline=deadline,
-    )

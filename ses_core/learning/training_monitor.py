@@ -55,7 +55,8 @@ class TrainingMonitor(BaseCallback):
     def _on_training_start(self) -> None:
         self._freeze(self._frozen_decisions > 0)
 
-    def _on_rollout_start(self) -> None:
+    def _on_rollout_end(self) -> None:
+        # Asked before the update, so that a training of a single rollout trains its actor too.
         if self.num_timesteps >= self._frozen_decisions:
             self._freeze(False)
 

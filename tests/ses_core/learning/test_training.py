@@ -1,5 +1,6 @@
 """Tests of training in the real simulator."""
 
+import itertools
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from ses_core.robot_profile import JACKAL
 from ses_core.settings import SimulationSettings, TrainingSettings
 from tests.ses_core.learning.places import corridor
 
-SHORT = TrainingSettings(steps=128, parallel_envs=4, critic_share=0.0)
+SHORT = TrainingSettings(steps=128, parallel_envs=4)
 SEEN = np.random.default_rng(9).uniform(-0.5, 0.5, (40, DEFAULT_OBSERVATION.length))
 
 
@@ -21,15 +22,16 @@ def parent() -> ParameterPolicy:
 
 
 def run(
-    settings: TrainingSettings, start: ParameterPolicy | None, *, stops: bool = False
+    settings: TrainingSettings, start: ParameterPolicy | None, *, stop_after: int = 10_000
 ) -> TrainingResult:
+    asked = itertools.count(1)
     return train(
         [corridor()],
         parent=start,
         settings=settings,
         simulation=SimulationSettings(sensing_rate_hz=2.0),
         profile=JACKAL,
-        deadline=lambda: stops,
+        deadline=lambda: next(asked) > stop_after,
     )
 
 
@@ -60,13 +62,18 @@ def test_equal_arguments_give_equal_weights_and_other_seeds_others() -> None:
 
 def test_a_new_critic_learns_alone_first() -> None:
     start = parent()
-    result = run(SHORT.model_copy(update={"critic_share": 0.99}), start)
-    np.testing.assert_array_equal(result.policy.act(SEEN), start.act(SEEN))
+    alone = SHORT.model_copy(update={"algorithm": "td3", "critic_share": 0.9})
+    np.testing.assert_array_equal(
+        run(alone, start, stop_after=24).policy.act(SEEN), start.act(SEEN)
+    )
+    together = alone.model_copy(update={"critic_share": 0.1})
+    moved = run(together, start, stop_after=24).policy.act(SEEN) != start.act(SEEN)
+    assert moved.any()
 
 
 def test_a_passed_deadline_leaves_the_parent_as_it_is() -> None:
     start = parent()
-    result = run(SHORT, start, stops=True)
+    result = run(SHORT, start, stop_after=3)
     assert result.reason == "deadline"
     assert result.steps < 128
     np.testing.assert_array_equal(result.policy.act(SEEN), start.act(SEEN))
