@@ -32,15 +32,15 @@ SETTINGS = Settings(
 
 
 @flow(name="demonstration")
-def demonstrate(root: Path, settings: Settings = SETTINGS) -> NightSummary:
+def demonstrate(root: Path, settings: Settings | None = None) -> NightSummary:
     """Let a small fleet drive through generated homes, then run a night over its logs.
 
     Args:
         root: Folder of the store.
-        settings: Of the night.
+        settings: Of the night; by default small enough to wait for.
     """
-    logs = deploy_demonstration.submit(
-        FLEET, store=LocalArtifactStore(root), settings=settings
-    ).result()
-    inbox = LocalArtifactStore(root).path(logs.ref)
-    return nightly(inbox=inbox, root=root, date=FLEET.day, settings=settings, demonstration=True)
+    chosen = settings or SETTINGS
+    store = LocalArtifactStore(root)
+    logs = deploy_demonstration.submit(FLEET, store=store, settings=chosen).result()
+    inbox = store.path(logs.ref)
+    return nightly(inbox=inbox, root=root, date=FLEET.day, settings=chosen, demonstration=True)

@@ -24,15 +24,6 @@ from ses_core.recipes import JsonValue
 
 app = typer.Typer()
 
-DEMONSTRATION: dict[str, JsonValue] = {
-    # The paper's share of challenging scenarios: so few logs hold too few above its threshold.
-    "filter.challenging_share": 0.23,
-    "synthesis.environments": 40,
-    "training.steps": 20_000,
-    "evaluation.trials": 2,
-}
-"""A night small enough to wait for; with a settings file, that file's night."""
-
 StageName = Literal[
     "ingest", "extract", "filter", "synthesize", "render", "train", "evaluate", "report"
 ]
@@ -127,12 +118,8 @@ def nightly(
 @app.command(epilog="Example: ses demo --root demo-store")
 def demo(context: typer.Context) -> None:
     """Let a small simulated fleet drive through homes, then run the night over its logs."""
-    from ses_core.settings import Settings
-
     command = command_context(context)
-    settings = command.settings()
-    if settings == Settings():
-        settings = command.settings(DEMONSTRATION)
+    settings = None if command.settings_file is None else command.settings()
     with embedded_server(command.root):
         from flows.demonstration import demonstrate
 

@@ -110,6 +110,9 @@ class FilterSettings(SettingsModel):
     heldout_share: float = Field(
         0.25, ge=0, lt=1, description="Share of the sites held out for evaluation, by their hash."
     )
+    heldout_limit: int = Field(
+        200, ge=1, description="Most held-out environments measured on, hardest first."
+    )
     min_path_in_free_fraction: float = Field(
         0.9, ge=0, le=1, description="Least share of the robot's own path in free cells."
     )

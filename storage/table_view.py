@@ -51,11 +51,18 @@ class TableView:
         return number if whole and version == SCHEMA_VERSION else None
 
     def prepare(self) -> None:
-        """Make every table's folder readable."""
+        """Make every table's folder readable; a new one appears together with its first file."""
         for name in TABLES:
             folder = self._layout.table_folder(name)
-            make_folder(folder)
-            write_empty_table(folder / SCHEMA_FILE, name)
+            if folder.exists():
+                write_empty_table(folder / SCHEMA_FILE, name)
+                continue
+            fresh = temporary_name(self._layout.staging / name)
+            with disk_errors(folder):
+                fresh.mkdir()
+                write_empty_table(fresh / SCHEMA_FILE, name)
+                fresh.rename(folder)
+                sync_folder(folder.parent)
 
     def apply(self, changes: Mapping[str, TablePart | None], *, number: int) -> None:
         """Show parts by slot, take away those given as None, and note the entry this makes.

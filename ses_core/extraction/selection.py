@@ -88,7 +88,8 @@ class Selection:
 
     Attributes:
         pool: `POOL_COLUMNS`, hardest first; rank counts from 1.
-        heldout: The same columns, from held-out places, for evaluation only.
+        heldout: The same columns, for evaluation only: every usable scenario of held-out places,
+            challenging or not, for that is what a deployed policy meets; unknown counts last.
         count_kind: The count that chose.
         funnels: By kind of count; the one that chose and both printed ones.
         sensitivity: How the set would change with the threshold.
@@ -164,7 +165,10 @@ def _choose(rows: pd.DataFrame, kind: CountKind, settings: FilterSettings) -> _C
     training = usable[usable["side"] == "training"]
     within_limit = training.groupby(["site", "robot"]).cumcount() < settings.per_robot_limit
     pool = _pool(training[within_limit])
-    heldout = _pool(usable[usable["side"] == "heldout"])
+    everything = scenarios.assign(count=counts)
+    unseen = everything[(everything["side"] == "heldout") & (everything["reason"] == "")]
+    unseen = unseen.sort_values(["count", "scenario_id"], ascending=[False, True])
+    heldout = _pool(unseen.head(settings.heldout_limit))
     reasons = challenging.loc[challenging["reason"] != "", "reason"].value_counts()
     funnel = FilterFunnel(
         terminal=int((rows["kind"] == "terminal").sum()),
@@ -173,7 +177,7 @@ def _choose(rows: pd.DataFrame, kind: CountKind, settings: FilterSettings) -> _C
         challenging=len(challenging),
         rejected={str(reason): int(count) for reason, count in sorted(reasons.items())},
         usable=len(usable),
-        heldout=len(heldout),
+        heldout=int((usable["side"] == "heldout").sum()),
         straddling=int((usable["side"] == "straddling").sum()),
         over_robot_limit=len(training) - len(pool),
         pool=len(pool),

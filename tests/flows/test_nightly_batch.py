@@ -1,0 +1,199 @@
+"""The whole night through the command, on a simulated fleet: built once, found ever after."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from ses_core.learning.policies import ParameterPolicy
+from storage.policy_files import ORIGINAL_FOLDER, read_policy
+from storage.table_schemas import TABLES
+from tests.simulated_fleet import DAY, write_fleet
+
+pytestmark = [pytest.mark.xdist_group("night"), pytest.mark.timeout(600)]
+
+SETTINGS = """
+[[ingest.robots]]
+match = "*"
+profile = "jackal"
+
+[filter]
+challenging_share = 0.9
+min_observed_fraction = 0.1
+
+[synthesis]
+environments = 4
+least_pool = 1
+synthesizer = { method = "rs" }
+
+[training]
+steps = 400
+parallel_envs = 8
+
+[evaluation]
+trials = 2
+spot_checks = 1
+"""
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """An inbox, a settings file and a store."""
+
+    inbox: Path
+    settings: Path
+    root: Path
+
+    def command(self, *arguments: str) -> list[str]:
+        ses = [sys.executable, "-m", "flows.command_line", *arguments]
+        return [*ses, "--root", str(self.root), "--settings", str(self.settings), "--json"]
+
+    def night(self, *options: str) -> dict[str, Any]:
+        arguments = ["nightly", "--inbox", str(self.inbox), "--date", DAY.isoformat(), *options]
+        answer = subprocess.run(self.command(*arguments), capture_output=True, text=True)
+        assert answer.returncode == 0, answer.stderr
+        summary: dict[str, Any] = json.loads(answer.stdout)
+        return summary
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Fleet:
+    folder = tmp_path_factory.mktemp("fleet")
+    assert write_fleet(folder / "inbox") == 8
+    (folder / "ses.toml").write_text(SETTINGS, encoding="utf-8")
+    return Fleet(folder / "inbox", folder / "ses.toml", folder / "store")
+
+
+@pytest.fixture(scope="module")
+def first(fleet: Fleet) -> dict[str, Any]:
+    return fleet.night()
+
+
+def built(summary: dict[str, Any]) -> dict[str, int]:
+    return {name: stage["built"] for name, stage in summary["stages"].items() if stage["built"]}
+
+
+def read_tables(root: Path) -> dict[str, pd.DataFrame]:
+    return {table: pd.read_parquet(root / "tables" / table) for table in TABLES}
+
+
+def test_a_night_goes_from_bags_to_a_judged_policy_and_a_page(
+    fleet: Fleet, first: dict[str, Any]
+) -> None:
+    assert first["logs"] == {
+        "new": 8,
+        "known": 0,
+        "quarantined": 0,
+        "waiting": 0,
+        "ignored": 8,
+        "unknown_robot": 0,
+    }
+    assert first["scenarios"] > 0
+    assert 0 < first["environments"] <= 4
+    assert set(built(first)) == set(first["stages"])
+    assert first["decisions_trained"] >= 300
+    policies = [row["policy"] for row in first["evaluation"]]
+    assert policies == [first["run_id"], "original", "dwa-slow", "dwa-fast"]
+    assert len({row["trials"] for row in first["evaluation"]}) == 1
+    assert [row["baseline"] for row in first["comparisons"]] == policies[1:]
+    assert first["decision"] == "insufficient-evidence"
+    assert first["champion"] == read_policy(ORIGINAL_FOLDER).policy_id
+    page = Path(first["report"]).read_text(encoding="utf-8")
+    assert first["run_id"] in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_the_nights_rows_stand_in_every_table(fleet: Fleet, first: dict[str, Any]) -> None:
+    tables = read_tables(fleet.root)
+    assert len(tables["logs"]) == 8
+    assert (tables["scenarios"].kind == "scenario").sum() == first["scenarios"]
+    for table in ("selections", "episodes", "policies"):
+        assert set(tables[table].run_id) == {first["run_id"]}
+    (policy,) = tables["policies"].to_dict("records")
+    assert policy["policy_id"] == first["policy"]
+    assert policy["parent_id"] == first["champion"]
+    synthesized = tables["environments"][tables["environments"].run_id == first["run_id"]]
+    assert len(synthesized) == first["environments"]
+    assert synthesized.is_traversable.all()
+    counts = tables["episodes"].groupby(["policy", "simulator"]).size()
+    assert counts[first["run_id"], "batch"] == first["evaluation"][0]["trials"]
+    assert counts[first["run_id"], "bullet"] == 1
+
+
+def test_training_changed_weights_and_behaviour(fleet: Fleet, first: dict[str, Any]) -> None:
+    (folder,) = (path.parent for path in (fleet.root / "objects/train").glob("*/policy.json"))
+    ours, original = read_policy(folder).policy, read_policy(ORIGINAL_FOLDER).policy
+    assert isinstance(ours, ParameterPolicy)
+    assert any((a != b).any() for a, b in zip(ours.weights, original.weights, strict=True))
+    observations = np.random.default_rng(0).uniform(-0.5, 0.5, (50, ours.observation.length))
+    assert np.abs(ours.act(observations) - original.act(observations)).max() > 1e-6
+
+
+def test_a_second_night_builds_nothing_and_says_the_same(
+    fleet: Fleet, first: dict[str, Any]
+) -> None:
+    before = {path: path.stat().st_mtime_ns for path in fleet.root.glob("batches/*")}
+    second = fleet.night()
+    assert built(second) == {}
+    assert second["logs"]["known"] == 8
+    for key in ("run_id", "scenarios", "environments", "evaluation", "decision", "policy"):
+        assert second[key] == first[key]
+    assert {path: path.stat().st_mtime_ns for path in fleet.root.glob("batches/*")} == before
+
+
+def test_refreshing_a_stage_builds_it_and_what_follows_but_nothing_before(
+    fleet: Fleet, first: dict[str, Any]
+) -> None:
+    again = fleet.night("--refresh", "evaluate")
+    assert set(built(again)) == {"evaluate", "report"}
+    assert again["evaluation"] == first["evaluation"]
+
+
+def test_a_killed_night_shows_whole_tables_and_repeats_nothing_finished(
+    fleet: Fleet, first: dict[str, Any], tmp_path: Path
+) -> None:
+    killed = Fleet(fleet.inbox, fleet.settings, tmp_path / "store")
+    arguments = ["nightly", "--inbox", str(fleet.inbox), "--date", DAY.isoformat()]
+    taken: list[int] = []
+    for enough in (1, 4, 8):
+        _kill_when(killed.command(*arguments), killed.root, logs=enough)
+        tables = read_tables(killed.root)
+        taken.append(len(tables["logs"]))
+        assert taken[-1] >= enough
+        assert set(tables["trajectories"].log_id) == set(tables["logs"].log_id)
+        assert set(tables["scenarios"].log_id) <= set(tables["logs"].log_id)
+    last = killed.night()
+    assert last["logs"]["known"] >= taken[-1]
+    assert last["scenarios"] == first["scenarios"]
+    undisturbed, disturbed = read_tables(fleet.root), read_tables(killed.root)
+    for table, key in (("trajectories", ["log_id", "step"]), ("scenarios", ["scenario_id"])):
+        pd.testing.assert_frame_equal(
+            disturbed[table].sort_values(key, ignore_index=True),
+            undisturbed[table].sort_values(key, ignore_index=True),
+        )
+
+
+def _kill_when(command: Sequence[str], root: Path, *, logs: int) -> None:
+    """Start a night and kill all of it as soon as so many logs stand in the table."""
+    night = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    try:
+        deadline = time.monotonic() + 120.0
+        while time.monotonic() < deadline and night.poll() is None:
+            if len(list((root / "tables/logs").glob(f"{'[0-9a-f]' * 64}.parquet"))) >= logs:
+                break
+            time.sleep(0.02)
+    finally:
+        os.killpg(night.pid, signal.SIGKILL)
+        night.wait()
