@@ -53,7 +53,7 @@ class Lineage:
         parent_id: The policy it was trained from; empty when trained from nothing.
         run_id: The run that trained it.
         steps: Decisions trained.
-        environments: Number of worlds or environments it was trained in.
+        environments: Number of navigation tasks it was trained in.
         trained_in: What those were, in words.
     """
 
@@ -277,7 +277,7 @@ def _card(record: Mapping[str, Any]) -> str:
 Sets the parameters of a dynamic-window planner once per {record["decision_period_s"]:g} s on a
 {record["robot"]} (APPLR). It never commands a velocity itself.
 
-- Trained in: {lineage["trained_in"]} ({lineage["environments"]} worlds)
+- Trained in: {lineage["trained_in"]} ({lineage["environments"]} tasks)
 - Algorithm: {lineage["algorithm"]}, {lineage["steps"]} decisions, seed {lineage["seed"]}
 - Parent: {lineage["parent_id"] or "none, from random weights"}
 - Run: {lineage["run_id"] or "none"}

@@ -126,6 +126,6 @@ def test_a_record_that_is_none_is_refused(text: bytes) -> None:
 
 def test_the_card_says_where_the_policy_comes_from() -> None:
     card = packed()["card.md"].decode()
-    assert "drawn places (12 worlds)" in card
+    assert "drawn places (12 tasks)" in card
     assert "ppo, 1000 decisions, seed 3" in card
     assert "| `inflation_radius` | 0.1 | 0.6 | m |" in card
