@@ -88,13 +88,20 @@ class ConsoleHandler(logging.Handler):
         stage, share = getattr(record, "stage", None), getattr(record, "share", None)
         if isinstance(stage, str) and isinstance(share, float):
             self._display.update(stage, share)
-        else:
+        elif not _says_nothing(record):
             self._display.line(self.format(_without_foreseen_traceback(record)))
 
     def close(self) -> None:
         """Give the terminal back."""
         self._display.close()
         super().close()
+
+
+def _says_nothing(record: logging.LogRecord) -> bool:
+    """Tell whether Prefect only says that all is well: three hundred times in a large night."""
+    return record.getMessage().startswith(
+        ("Finished in state Completed", "Finished in state Cached")
+    )
 
 
 def _without_foreseen_traceback(record: logging.LogRecord) -> logging.LogRecord:

@@ -73,3 +73,15 @@ def test_records_with_a_share_move_the_bar_of_their_stage() -> None:
     handler.emit(told)
 
     assert stream.getvalue() == "fit 25 %\n"
+
+
+def test_lines_that_only_say_that_all_is_well_are_not_shown() -> None:
+    stream = io.StringIO()
+    handler = ConsoleHandler(stream)
+    for message in (
+        "Finished in state Completed()",
+        "took in r1.mcap",
+        "Finished in state Failed()",
+    ):
+        handler.emit(logging.LogRecord("ses", logging.INFO, "", 0, message, None, None))
+    assert stream.getvalue().splitlines() == ["took in r1.mcap", "Finished in state Failed()"]
