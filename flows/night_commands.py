@@ -124,7 +124,10 @@ def demo(context: typer.Context) -> None:
         from flows.demonstration import demonstrate
 
         summary = demonstrate(command.root, settings)
-    command.answer(summary.model_dump(mode="json"), lambda: describe_night(summary))
+    remark = (
+        f"\nThis is a demonstration, not evidence: {summary.decisions_trained:,} decisions trained."
+    )
+    command.answer(summary.model_dump(mode="json"), lambda: describe_night(summary) + remark)
 
 
 @app.command(epilog="Example: ses ingest --inbox logs")
