@@ -66,7 +66,7 @@ class Fleet:
         return summary
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Fleet:
     folder = tmp_path_factory.mktemp("fleet")
     assert write_fleet(folder / "inbox") == 8
@@ -74,7 +74,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Fleet:
     return Fleet(folder / "inbox", folder / "ses.toml", folder / "store")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def first(fleet: Fleet) -> dict[str, Any]:
     return fleet.night()
 
@@ -173,7 +173,7 @@ def test_a_killed_night_shows_whole_tables_and_repeats_nothing_finished(
         assert set(tables["trajectories"].log_id) == set(tables["logs"].log_id)
         assert set(tables["scenarios"].log_id) <= set(tables["logs"].log_id)
     last = killed.night()
-    assert last["logs"]["known"] >= taken[-1]
+    assert last["stages"]["ingest"]["found"] >= taken[-1]
     assert last["scenarios"] == first["scenarios"]
     undisturbed, disturbed = read_tables(fleet.root), read_tables(killed.root)
     for table, key in (("trajectories", ["log_id", "step"]), ("scenarios", ["scenario_id"])):
