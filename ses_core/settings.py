@@ -260,7 +260,6 @@ class StoreSettings(SettingsModel):
 class Settings(SettingsModel):
     """Everything a night depends on."""
 
-    target_robot: RobotProfile = Field(JACKAL, description="The robot that is trained.")
     ingest: IngestSettings = IngestSettings()
     extraction: ExtractionSettings = ExtractionSettings()
     filter: FilterSettings = FilterSettings()
@@ -269,3 +268,4 @@ class Settings(SettingsModel):
     training: TrainingSettings = TrainingSettings()
     evaluation: EvaluationSettings = EvaluationSettings()
     store: StoreSettings = StoreSettings()
+    target_robot: RobotProfile = Field(JACKAL, description="The robot that is trained.")
