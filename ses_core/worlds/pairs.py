@@ -56,8 +56,8 @@ def sample_tasks(
 ) -> list[NavigationTask]:
     """Draw tasks in a world, their straight start-goal distance at least `min_distance` [m].
 
-    The preset `long` asks for pairs at least half the world's diagonal apart: in houses they
-    yield scenarios at the paper's rate of about three per deployment.
+    The preset `long` asks for pairs at least half the world's diagonal apart, to get more
+    scenarios out of a deployment: the paper's come to about three each.
 
     Returns:
         `count` tasks; the one course of a world that has a course; none where no two places
