@@ -23,6 +23,7 @@ from flows import (
 )
 from flows.command_arguments import describe_misuse, hoist_global_options, sentence
 from flows.command_context import CommandContext, answers_only_on_stdout
+from flows.prompt_ending import end_soon_after_signals
 from ses_core.errors import SesError, SettingsError
 
 FAILED, MISUSED = 1, 2
@@ -91,6 +92,7 @@ def main() -> NoReturn:
     """Run the command line that this process was started with."""
     # Our own threads use the cores; the linear algebra libraries must not fight them for it.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    end_soon_after_signals()
     sys.exit(run(sys.argv[1:]))
 
 
