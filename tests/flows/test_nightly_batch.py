@@ -197,3 +197,19 @@ def _kill_when(command: Sequence[str], root: Path, *, logs: int) -> None:
     finally:
         os.killpg(night.pid, signal.SIGKILL)
         night.wait()
+
+
+def test_one_more_log_is_the_only_one_decoded_and_extracted(
+    fleet: Fleet, first: dict[str, Any], tmp_path: Path
+) -> None:
+    write_fleet(tmp_path, homes=1, drives=1, seed=11)
+    (tmp_path / next(tmp_path.iterdir()).name).rename(fleet.inbox / "home-new")
+    more = fleet.night()
+    stages = more["stages"]
+    assert {name: stages["ingest"][name] for name in ("built", "found")} == {"built": 1, "found": 8}
+    assert {name: stages["extract"][name] for name in ("built", "found")} == {
+        "built": 1,
+        "found": 8,
+    }
+    assert more["run_id"] != first["run_id"]
+    assert len(pd.read_parquet(fleet.root / "tables/logs")) == 9
