@@ -36,6 +36,16 @@ def write_empty_table(path: Path, table: str) -> None:
     _write(path, table_schema(table).empty_table())
 
 
+def merge_tables(path: Path, table: str, sources: Sequence[Path]) -> None:
+    """Write the rows of several files of a table as one, in their order.
+
+    Raises:
+        ArtifactError: A file is missing or damaged, or the disk is full or failing.
+    """
+    merged = [table_schema(table).empty_table(), *(read_arrow(file, table) for file in sources)]
+    _write(path, pa.concat_tables(merged))
+
+
 def read_table(path: Path, table: str, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Read one file of a table, all its columns by default, checking schema and checksums.
 

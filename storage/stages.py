@@ -8,6 +8,7 @@ from ses_core.recipes import Stage
 
 INGEST = Stage("ingest", 1)
 EXTRACT = Stage("extract", 1)
+BATCH = Stage("batch", 1)
 FILTER = Stage("filter", 1)
 FIT = Stage("fit", 1)
 SYNTHESIZE = Stage("synthesize", 1)
@@ -21,6 +22,7 @@ DEPLOY = Stage("deploy", 1)
 STAGES = (
     INGEST,
     EXTRACT,
+    BATCH,
     FILTER,
     FIT,
     SYNTHESIZE,
@@ -32,5 +34,5 @@ STAGES = (
     DEPLOY,
 )
 
-DISPOSABLE_STAGES = (FIT, RENDER, REPORT)
+DISPOSABLE_STAGES = (BATCH, FIT, RENDER, REPORT)
 """Stages whose artifacts only serve their own night: dropped when long unused."""

@@ -11,10 +11,10 @@ from ses_core.extraction.selection import select_challenging
 from ses_core.recipes import ArtifactRef, Recipe, settings_json
 from ses_core.settings import FilterSettings
 from storage.artifact_store import LocalArtifactStore
+from storage.batch_rows import read_batch_rows
 from storage.materialize import Materialized, materialize
 from storage.selection_files import write_selection
 from storage.stages import FILTER
-from storage.table_reader import open_table
 from tasks.outcome import conclude
 
 
@@ -35,16 +35,15 @@ def select_scenarios(
     )
 
     def build(directory: Path) -> None:
-        root = store.layout.root
-        logs = open_table(root, "logs", columns=["log_id", "pose_source"])
-        environments = open_table(root, "environments")
+        rows = read_batch_rows(store, newest=last_batch)
+        logs = rows.logs
         selection = select_challenging(
-            open_table(root, "scenarios"),
-            environments,
+            rows.scenarios,
+            rows.environments,
             settings=settings,
             last_batch=last_batch,
             map_logs=frozenset(logs.loc[logs["pose_source"] == "map", "log_id"]),
         )
-        write_selection(directory, selection, environments)
+        write_selection(directory, selection, rows.environments)
 
     return conclude(materialize(store, recipe, build, anew=anew))
