@@ -103,6 +103,11 @@ class SimulatorState(Protocol):
         ...
 
     @property
+    def odometry(self) -> FloatArray:
+        """Poses (N, 3) [m, m, rad] that the stack believes: at the start the true ones."""
+        ...
+
+    @property
     def velocities(self) -> FloatArray:
         """Measured velocities (N, 2) [m/s, rad/s]."""
         ...

@@ -22,6 +22,30 @@ class LaserProfile(SettingsModel):
     mount_yaw_rad: float = Field(0.0, description="How the laser is turned on the robot.")
 
 
+class LocalPlannerProfile(SettingsModel):
+    """What the local planner is set to and no policy changes, under `move_base` names.
+
+    Defaults are jackal_navigation's base_local_planner_params.yaml.
+    """
+
+    min_vel_x: float = Field(0.1, ge=0, description="Slowest forward sample [m/s].")
+    min_in_place_vel_theta: float = Field(
+        0.314, ge=0, description="Slowest turn on the spot [rad/s]."
+    )
+    escape_vel: float = Field(-0.5, lt=0, description="Speed of backing up [m/s].")
+    occdist_scale: float = Field(
+        0.1, ge=0, description="Weight of the raw obstacle cost, which reaches 253."
+    )
+    heading_lookahead: float = Field(
+        0.325, gt=0, description="Turns on the spot look this far ahead [m]."
+    )
+    oscillation_reset_dist: float = Field(
+        0.05, ge=0, description="Moved this far, turning back is allowed again [m]."
+    )
+    escape_reset_dist: float = Field(0.1, ge=0, description="Moved this far, it got away [m].")
+    escape_reset_theta: float = Field(0.1, ge=0, description="Turned this far, it got away [rad].")
+
+
 class RobotProfile(SettingsModel):
     """One kind of robot: body, limits, laser, topics; defaults are the paper's Jackal.
 
@@ -45,6 +69,7 @@ class RobotProfile(SettingsModel):
         0.25, gt=0, description="A command holds this long, then the base stops (cmd_vel_timeout)."
     )
     laser: LaserProfile = LaserProfile()
+    planner: LocalPlannerProfile = LocalPlannerProfile()
     scan_topic: str | None = Field(None, description="Fix the topic; else it is found by type.")
     odometry_topic: str | None = Field(None, description="Fix the topic; else found by type.")
     command_topic: str | None = Field(None, description="Fix the topic; else found by type.")

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ses_core.imperfections import Imperfections, PresetName
 from ses_core.robot_profile import JACKAL, RobotProfile
 from ses_core.settings_model import SettingsModel
 
@@ -191,17 +192,19 @@ class SynthesisSettings(SettingsModel):
 
 
 class SimulationSettings(SettingsModel):
-    """Imperfections and rates of the simulated robot."""
+    """Rates, rules and imperfections of the simulated robot."""
 
     control_rate_hz: float = Field(20.0, gt=0, description="Planner ticks (controller_frequency).")
     sensing_rate_hz: float = Field(5.0, gt=0, description="Scans, costmap and plan updates.")
-    range_noise_m: float = Field(0.01, ge=0, description="Standard deviation of a range reading.")
-    range_dropout: float = Field(0.0, ge=0, le=1, description="Share of readings lost.")
+    imperfections: PresetName | Imperfections = Field(
+        "real", description="A preset, or levels of your own."
+    )
+    known_map: bool = Field(
+        False, description="The costmap begins with every wall, else with nothing."
+    )
     footprint_clearing: bool = Field(
         True, description="The robot forgets obstacles it stands on (costmap_2d's default)."
     )
-    actuation_noise: float = Field(0.05, ge=0, description="Relative noise of the wheel speeds.")
-    command_delay_ticks: int = Field(1, ge=0, description="Ticks before a command takes effect.")
     time_limit_s: float = Field(100.0, gt=0, description="An episode ends here as a time-out.")
     success_radius_m: float = Field(1.0, gt=0, description="This near the goal is a success.")
     collisions_end: bool = Field(True, description="Contact ends the episode; else it backs off.")

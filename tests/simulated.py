@@ -7,17 +7,23 @@ import numpy as np
 
 from ses_core.arrays import BoolArray, FloatArray
 from ses_core.geometry import Pose2D
+from ses_core.imperfections import PRESETS
 from ses_core.navigation import NavigationTask, World
 from ses_core.occupancy import OccupancyGrid
 from ses_core.planning.parameters import DWA_SLOW, PlannerParameters
 from ses_core.robot_profile import JACKAL, RobotProfile
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.batch import BatchSimulator
+from ses_core.simulation.conditions import Conditions
 from ses_core.simulation.robot import RobotModel
 from ses_core.simulation.state import Memory, Scratch, Slot
-from ses_core.simulation.tick import Conditions
 
-CLEAN = SimulationSettings(range_noise_m=0.0, actuation_noise=0.0, command_delay_ticks=0)
+CLEAN = SimulationSettings(imperfections="clean")
+
+
+def flawed(**levels: float) -> SimulationSettings:
+    """Settings with these imperfections and no others."""
+    return SimulationSettings(imperfections=PRESETS["clean"].model_copy(update=levels))
 
 
 def hall(*, length: float = 9.0, width: float = 5.0, resolution: float = 0.1) -> BoolArray:

@@ -97,10 +97,15 @@ def work_in_scan(
     `hits` is working space for the cells of at least B hits; `clears_footprint` is costmap_2d's
     `footprint_clearing_enabled`.
     """
-    cosine, sine = math.cos(slot.yaw), math.sin(slot.yaw)
-    column = (slot.x + cosine * robot.mount_x - sine * robot.mount_y - slot.map_x) / RESOLUTION_M
-    row = (slot.y + sine * robot.mount_x + cosine * robot.mount_y - slot.map_y) / RESOLUTION_M
-    cosine, sine = math.cos(slot.yaw + robot.mount_yaw), math.sin(slot.yaw + robot.mount_yaw)
+    cosine, sine = math.cos(slot.scan_yaw), math.sin(slot.scan_yaw)
+    column = (
+        slot.scan_x + cosine * robot.mount_x - sine * robot.mount_y - slot.map_x
+    ) / RESOLUTION_M
+    row = (slot.scan_y + sine * robot.mount_x + cosine * robot.mount_y - slot.map_y) / RESOLUTION_M
+    cosine, sine = (
+        math.cos(slot.scan_yaw + robot.mount_yaw),
+        math.sin(slot.scan_yaw + robot.mount_yaw),
+    )
     count = 0
     for beam in range(ranges.shape[0]):
         if ranges[beam] >= OBSTACLE_RANGE_M:

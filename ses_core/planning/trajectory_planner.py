@@ -24,18 +24,6 @@ from ses_core.planning.rollouts import NO_WAY, SIM_TIME_S, rollout_cost
 from ses_core.simulation.robot import RobotModel, drive, wrap
 from ses_core.simulation.state import Memory, Scratch, Slot, UInt16Array
 
-MIN_VEL_X = 0.1
-MIN_IN_PLACE_VEL_THETA = 0.314
-ESCAPE_VEL = -0.5
-ESCAPE_REACH_M = -ESCAPE_VEL * SIM_TIME_S
-OCCDIST_SCALE = 0.1
-HEADING_LOOKAHEAD_M = 0.325
-OSCILLATION_RESET_M = 0.05
-ESCAPE_RESET_M = 0.1
-ESCAPE_RESET_RAD = 0.1
-"""jackal_navigation's base_local_planner_params.yaml. `occdist_scale` multiplies raw costs, while
-the two biases are multiplied by the cell size (meter_scoring)."""
-
 MAX_VX_SAMPLES = 24
 MAX_VTHETA_SAMPLES = 64
 
@@ -76,9 +64,11 @@ def find_command(
     last = slot.plan_size - 1
     away_x = slot.map_x + memory.plans[number, last, 0] * RESOLUTION_M - slot.x
     away_y = slot.map_y + memory.plans[number, last, 1] * RESOLUTION_M - slot.y
-    highest = min(parameters[_MAX_VEL_X], math.hypot(away_x, away_y) / SIM_TIME_S)
-    v_low, v_high = velocity_window(slot.v, MIN_VEL_X, highest, robot.acceleration, period)
-    turn = parameters[_MAX_VEL_THETA]
+    highest = min(
+        min(parameters[_MAX_VEL_X], robot.max_speed), math.hypot(away_x, away_y) / SIM_TIME_S
+    )
+    v_low, v_high = velocity_window(slot.v, robot.min_vel_x, highest, robot.acceleration, period)
+    turn = min(parameters[_MAX_VEL_THETA], robot.max_turn_rate)
     w_low, w_high = velocity_window(slot.w, -turn, turn, robot.turn_acceleration, period)
     w_step = (w_high - w_low) / (vtheta_count - 1)
     best_cost, best_v, best_w = -1.0, 0.0, 0.0
@@ -114,8 +104,8 @@ def find_command(
         best_w,
     )
     if best_cost >= 0.0:
-        _note_oscillation(slot, best_v, best_w)
-        _end_escape(slot)
+        _note_oscillation(slot, robot, best_v, best_w)
+        _end_escape(slot, robot)
         slot.command_v, slot.command_w = best_v, best_w
         return True
     return _escape(slot, memory, number, robot)
@@ -167,11 +157,11 @@ def _best_forward(
         samples[sample] = math.inf
         v = v_low + (sample // vtheta_count) * v_step
         w = _forward_turn(sample % vtheta_count, w_low, w_step)
-        allowed = math.inf if best < 0 else (best_cost - end_cost) / OCCDIST_SCALE
+        allowed = math.inf if best < 0 else (best_cost - end_cost) / robot.occdist_scale
         cost = rollout_cost(slot, memory, number, robot, v, w, True, allowed)
         if cost < 0.0:
             continue
-        cost = end_cost + OCCDIST_SCALE * cost
+        cost = end_cost + robot.occdist_scale * cost
         if best < 0 or cost < best_cost or (cost == best_cost and sample < best):
             best, best_cost = sample, cost
 
@@ -216,28 +206,28 @@ def _prefer_turning(
         if abs(sampled) <= w_step or (slot.is_stuck_left if sampled < 0.0 else slot.is_stuck_right):
             continue
         w = (
-            max(sampled, MIN_IN_PLACE_VEL_THETA)
+            max(sampled, robot.min_in_place_vel_theta)
             if sampled > 0.0
-            else min(sampled, -MIN_IN_PLACE_VEL_THETA)
+            else min(sampled, -robot.min_in_place_vel_theta)
         )
         yaw = slot.yaw + w * SIM_TIME_S
-        ahead_x = x + HEADING_LOOKAHEAD_M / RESOLUTION_M * math.cos(yaw)
-        ahead_y = y + HEADING_LOOKAHEAD_M / RESOLUTION_M * math.sin(yaw)
+        ahead_x = x + robot.heading_lookahead / RESOLUTION_M * math.cos(yaw)
+        ahead_y = y + robot.heading_lookahead / RESOLUTION_M * math.sin(yaw)
         ahead = float(goal[int(ahead_y), int(ahead_x)])
         if ahead >= least_ahead:
             continue
         cost = rollout_cost(slot, memory, number, robot, 0.0, w, True, math.inf)
         if cost < 0.0:
             continue
-        cost = end_cost + OCCDIST_SCALE * cost
+        cost = end_cost + robot.occdist_scale * cost
         if best_cost < 0.0 or cost <= best_cost:
             best_cost, best_v, best_w, least_ahead = cost, 0.0, w, ahead
     return best_cost, best_v, best_w
 
 
 @compiled
-def _note_oscillation(slot: Slot, v: float, w: float) -> None:
-    """Bar turning back after turning twice one way, until the robot has moved 0.05 m.
+def _note_oscillation(slot: Slot, robot: RobotModel, v: float, w: float) -> None:
+    """Bar turning back after turning twice one way, until the robot has moved on.
 
     The names are the original's: after two turns to the right `stuck_right` bars turns to the
     left.
@@ -250,36 +240,39 @@ def _note_oscillation(slot: Slot, v: float, w: float) -> None:
             slot.is_stuck_left = slot.is_stuck_left or slot.is_rotating_left
             slot.is_rotating_left = True
         slot.oscillation_x, slot.oscillation_y = slot.x, slot.y
-    _reset_oscillation(slot)
+    _reset_oscillation(slot, robot)
 
 
 @compiled
-def _reset_oscillation(slot: Slot) -> None:
+def _reset_oscillation(slot: Slot, robot: RobotModel) -> None:
     moved = math.hypot(slot.x - slot.oscillation_x, slot.y - slot.oscillation_y)
-    if moved > OSCILLATION_RESET_M:
+    if moved > robot.oscillation_reset_dist:
         slot.is_rotating_left, slot.is_rotating_right = False, False
         slot.is_stuck_left, slot.is_stuck_right = False, False
 
 
 @compiled
-def _end_escape(slot: Slot) -> None:
+def _end_escape(slot: Slot, robot: RobotModel) -> None:
     """Allow forward samples again once the robot got away."""
     moved = math.hypot(slot.x - slot.escape_x, slot.y - slot.escape_y)
-    if moved > ESCAPE_RESET_M or abs(wrap(slot.yaw - slot.escape_yaw)) > ESCAPE_RESET_RAD:
+    if (
+        moved > robot.escape_reset_dist
+        or abs(wrap(slot.yaw - slot.escape_yaw)) > robot.escape_reset_theta
+    ):
         slot.is_escaping = False
 
 
 @compiled
 def _escape(slot: Slot, memory: Memory, number: int, robot: RobotModel) -> bool:
     """Back up, even where the map shows an obstacle; not where no way leads from."""
-    cost = rollout_cost(slot, memory, number, robot, ESCAPE_VEL, 0.0, False, math.inf)
-    _reset_oscillation(slot)
+    cost = rollout_cost(slot, memory, number, robot, robot.escape_vel, 0.0, False, math.inf)
+    _reset_oscillation(slot, robot)
     if not slot.is_escaping and cost > NO_WAY:
         slot.escape_x, slot.escape_y, slot.escape_yaw = slot.x, slot.y, slot.yaw
         slot.is_escaping = True
-    _end_escape(slot)
+    _end_escape(slot, robot)
     if cost == NO_WAY:
         slot.command_v, slot.command_w = 0.0, 0.0
         return False
-    slot.command_v, slot.command_w = ESCAPE_VEL, 0.0
+    slot.command_v, slot.command_w = robot.escape_vel, 0.0
     return True

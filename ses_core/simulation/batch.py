@@ -10,6 +10,7 @@ import numpy as np
 
 from ses_core.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
+from ses_core.imperfections import Imperfections, resolve
 from ses_core.navigation import NavigationTask
 from ses_core.planning.costmap import (
     FAR_CELLS,
@@ -23,10 +24,12 @@ from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.planning.trajectory_planner import MAX_VTHETA_SAMPLES, MAX_VX_SAMPLES
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
+from ses_core.simulation.conditions import conditions
+from ses_core.simulation.episode_start import draw_start
 from ses_core.simulation.robot import robot_model
 from ses_core.simulation.state import SLOT_DTYPE, BatchState, Memory, Scratch, snapshot
-from ses_core.simulation.tick import ADVANCE, PLAN, SENSE, SETTLE, Outside, conditions, run_share
-from ses_core.simulation.world_pool import WorldPool, describe_world
+from ses_core.simulation.tick import ADVANCE, PLAN, SENSE, SETTLE, Outside, run_share
+from ses_core.simulation.world_pool import WorldPool, describe_world, known_map
 
 _NO_PARAMETERS = np.zeros((0, len(PARAMETER_NAMES)))
 
@@ -55,6 +58,9 @@ class BatchSimulator:
         if slots < 1:
             raise ValueError(f"simulator has {slots} slots, expected at least 1")
         threads = min(numba.get_num_threads(), slots)
+        self._profile = profile
+        self._levels = resolve(settings.imperfections)
+        self._is_map_known = settings.known_map
         self._robot = robot_model(profile)
         self._setup = conditions(settings)
         self._slots = np.zeros(slots, dtype=SLOT_DTYPE)
@@ -63,9 +69,7 @@ class BatchSimulator:
         self._pool = WorldPool()
         self._world_keys = [0] * slots
         self._map_sizes = np.ones(slots, dtype=np.int64)
-        self._memory = _memory(
-            slots, beams=profile.laser.beams, delay=settings.command_delay_ticks, cells=slots
-        )
+        self._memory = _memory(slots, beams=profile.laser.beams, levels=self._levels, cells=slots)
         self._threads = ThreadPoolExecutor(max_workers=threads, thread_name_prefix="simulator")
         self._scratch = _scratch(threads=threads, largest_map=1)
         self._outside = Outside(
@@ -104,8 +108,8 @@ class BatchSimulator:
         self._place_maps()
         chosen = np.zeros(self.slots, dtype=np.bool_)
         chosen[slots] = True
-        for number in slots:
-            self._clear_memory(int(number))
+        for number, task in zip(slots, tasks, strict=True):
+            self._clear_memory(int(number), task)
         self._run(SENSE, self._outside._replace(chosen=chosen))
 
     def advance(self, parameters: FloatArray, ticks: int) -> None:
@@ -205,12 +209,20 @@ class BatchSimulator:
         map_offset = int(slot["map_offset"])
         self._slots[number] = np.zeros((), dtype=SLOT_DTYPE)
         slot["map_offset"] = map_offset
-        slot["x"], slot["y"], slot["yaw"] = task.start.x, task.start.y, task.start.yaw
+        sequence = np.random.SeedSequence(seed)
+        start = draw_start(
+            task, profile=self._profile, levels=self._levels, rng=np.random.default_rng(sequence)
+        )
+        for name in ("", "true_", "odometry_"):
+            slot[f"{name}x"], slot[f"{name}y"] = start.pose.x, start.pose.y
+            slot[f"{name}yaw"] = start.pose.yaw
         for name in ("anchor", "oscillation", "escape"):
-            slot[f"{name}_x"], slot[f"{name}_y"] = task.start.x, task.start.y
+            slot[f"{name}_x"], slot[f"{name}_y"] = start.pose.x, start.pose.y
+        slot["turn_gain"], slot["way_gain"] = start.turn_gain, start.way_gain
+        slot["odometry_gain"] = start.odometry_gain
         slot["goal_x"], slot["goal_y"] = task.goal
         slot["local_goal_x"], slot["local_goal_y"] = task.goal
-        slot["random_state"] = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
+        slot["random_state"] = sequence.generate_state(1, np.uint64)[0]
         slot["search_needed"] = True
         slot["inflation_radius"] = -1.0
         slot["outcome"] = EpisodeOutcome.RUNNING
@@ -249,16 +261,20 @@ class BatchSimulator:
             threads = len(self._scratch.queue)
             self._scratch = _scratch(threads=threads, largest_map=largest)
 
-    def _clear_memory(self, number: int) -> None:
-        """Forget what the last episode in a slot had seen."""
+    def _clear_memory(self, number: int, task: NavigationTask) -> None:
+        """Forget what the last episode in a slot had seen; begin with the map if it is known."""
         first, size = int(self._slots["map_offset"][number]), int(self._map_sizes[number])
         self._memory.marks[first : first + size] = 0
         self._memory.distances[first : first + size] = 255
         self._memory.costs[number] = 0.0
         self._memory.delayed[number] = 0.0
+        if self._is_map_known:
+            marks, distances = known_map(self._slots[number], task.world.grid)
+            self._memory.marks[first : first + marks.size] = marks.ravel()
+            self._memory.distances[first : first + marks.size] = distances.ravel()
 
 
-def _memory(slots: int, *, beams: int, delay: int, cells: int) -> Memory:
+def _memory(slots: int, *, beams: int, levels: Imperfections, cells: int) -> Memory:
     window = (slots, WINDOW_SIZE, WINDOW_SIZE)
     return Memory(
         clearance=np.zeros(1, dtype=np.uint8),
@@ -270,8 +286,9 @@ def _memory(slots: int, *, beams: int, delay: int, cells: int) -> Memory:
         window_distances=np.zeros(window, dtype=np.uint8),
         path_steps=np.zeros(window, dtype=np.uint16),
         goal_steps=np.zeros(window, dtype=np.uint16),
-        delayed=np.zeros((slots, delay + 1, 2)),
+        delayed=np.zeros((slots, levels.command_delay_ticks + 1, 2)),
         scans=np.full((slots, beams), np.inf, dtype=np.float32),
+        past_poses=np.zeros((slots, levels.scan_delay_ticks + 1, 6)),
     )
 
 

@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import pybullet
-from numpy.random import Generator
 
 from ses_core.arrays import ByteArray, Float32Array, FloatArray, IntArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
@@ -58,10 +57,8 @@ class BulletSimulator:
         self._stack = BatchSimulator(slots=slots, profile=profile, settings=settings)
         self._substeps = max(1, round(PHYSICS_RATE_HZ * self._stack.time_step))
         self._profile = profile
-        self._noise = settings.actuation_noise
         self._bodies: list[PhysicalSlot | None] = [None] * slots
         self._meshes: dict[int, tuple[OccupancyGrid, RenderedWorld]] = {}
-        self._rngs = [np.random.default_rng(0) for _ in range(slots)]
 
     @property
     def slots(self) -> int:
@@ -76,14 +73,14 @@ class BulletSimulator:
     def reset(self, slots: IntArray, tasks: Sequence[NavigationTask], seeds: IntArray) -> None:
         """Start an episode in each of the slots (S,) from tasks and noise seeds (S,)."""
         self._stack.reset(slots, tasks, seeds)
-        for number, task, seed in zip(slots.tolist(), tasks, seeds.tolist(), strict=True):
-            self._rngs[number] = np.random.default_rng(seed)
+        starts = self._stack.state().poses
+        for number, task in zip(slots.tolist(), tasks, strict=True):
             body = self._bodies[number]
             if body is None:
                 body = self._bodies[number] = PhysicalSlot(
                     self._profile, time_step=self.time_step / self._substeps
                 )
-            body.build(self._mesh(task.world.grid), task.start)
+            body.build(self._mesh(task.world.grid), Pose2D(*starts[number].tolist()))
 
     def advance(self, parameters: FloatArray, ticks: int) -> None:
         """Run control ticks under planner parameters (N, 7)."""
@@ -96,12 +93,7 @@ class BulletSimulator:
             commands = self._stack.plan_commands(parameters)
             for number in running.tolist():
                 body = self._body(number)
-                contacts[number] = body.drive(
-                    commands[number],
-                    substeps=self._substeps,
-                    noise=self._noise,
-                    rng=self._rngs[number],
-                )
+                contacts[number] = body.drive(commands[number], substeps=self._substeps)
                 poses[number], velocities[number] = body.pose(), body.velocity()
             self._stack.settle(poses, velocities, contacts)
 
@@ -148,7 +140,6 @@ class PhysicalSlot:
         if self._client < 0:
             raise RuntimeError("pybullet opened no further physics client")
         self._time_step = time_step
-        self._profile = profile
         self._frame = robot_frame(profile)
         self._urdf = robot_urdf(self._frame, name=profile.name)
         self._robot = self._ground = -1
@@ -174,14 +165,11 @@ class PhysicalSlot:
         ]
         self._robot = self._build_robot(start)
 
-    def drive(self, command: FloatArray, *, substeps: int, noise: float, rng: Generator) -> bool:
+    def drive(self, command: FloatArray, *, substeps: int) -> bool:
         """Drive by a command (2,) [m/s, rad/s] for one tick; tell whether the body touched."""
-        profile, frame = self._profile, self._frame
-        v = min(max(command[0], -profile.max_speed_mps), profile.max_speed_mps)
-        w = min(max(command[1], -profile.max_turn_rate_radps), profile.max_turn_rate_radps)
+        frame, (v, w) = self._frame, command
         half = TRACK_MULTIPLIER * frame.track / 2
-        slip = 1.0 + noise * rng.standard_normal(2)
-        left, right = (v - half * w) * slip[0], (v + half * w) * slip[1]
+        left, right = v - half * w, v + half * w
         pybullet.setJointMotorControlArray(
             self._robot,
             list(range(len(WHEELS))),

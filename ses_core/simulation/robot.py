@@ -30,6 +30,14 @@ class RobotModel(NamedTuple):
     max_turn_rate: float
     acceleration: float
     turn_acceleration: float
+    min_vel_x: float
+    min_in_place_vel_theta: float
+    escape_vel: float
+    occdist_scale: float
+    heading_lookahead: float
+    oscillation_reset_dist: float
+    escape_reset_dist: float
+    escape_reset_theta: float
     beams: FloatArray  # (B, 2) unit vectors in the laser's frame
     mount_x: float
     mount_y: float
@@ -60,6 +68,14 @@ def robot_model(profile: RobotProfile) -> RobotModel:
         max_turn_rate=profile.max_turn_rate_radps,
         acceleration=profile.acc_lim_x_mps2,
         turn_acceleration=profile.acc_lim_theta_radps2,
+        min_vel_x=profile.planner.min_vel_x,
+        min_in_place_vel_theta=profile.planner.min_in_place_vel_theta,
+        escape_vel=profile.planner.escape_vel,
+        occdist_scale=profile.planner.occdist_scale,
+        heading_lookahead=profile.planner.heading_lookahead,
+        oscillation_reset_dist=profile.planner.oscillation_reset_dist,
+        escape_reset_dist=profile.planner.escape_reset_dist,
+        escape_reset_theta=profile.planner.escape_reset_theta,
         beams=beam_directions(profile),
         mount_x=laser.mount_x_m,
         mount_y=laser.mount_y_m,

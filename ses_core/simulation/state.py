@@ -16,11 +16,21 @@ UInt16Array = NDArray[np.uint16]
 class Slot(Protocol):
     """One record of the slot table: an episode and the memory of its navigation stack.
 
-    Positions are in the frame of the slot's world [m], headings in radians, times in ticks.
+    Positions are in the frame of the slot's world [m], headings in radians, times in ticks. The
+    stack knows where it believes to be: at the start that is the truth, then odometry drifts.
     """
 
     # The episode.
-    x: float
+    true_x: float
+    true_y: float
+    true_yaw: float
+    odometry_x: float  # what the motion since the start adds up to, with its errors
+    odometry_y: float
+    odometry_yaw: float
+    turn_gain: float  # of the wheels' turning what becomes the robot's
+    way_gain: float  # of a way what odometry counts
+    odometry_gain: float  # of a turn what odometry counts
+    x: float  # where the stack believes to be: odometry with its jitter
     y: float
     yaw: float
     v: float  # measured [m/s]
@@ -46,6 +56,11 @@ class Slot(Protocol):
     world_x: float  # lower left corner
     world_y: float
     world_resolution: float
+
+    # The newest scan: where the robot believed to be when it was taken.
+    scan_x: float
+    scan_y: float
+    scan_yaw: float
 
     # What has been seen: a window of `Memory.marks`, `.distances` and `.potential`.
     map_offset: int
@@ -106,6 +121,7 @@ class Memory(NamedTuple):
     goal_steps: UInt16Array  # (N, W, W) cells to the local goal
     delayed: FloatArray  # (N, D, 2) commands under way to the wheels
     scans: Float32Array  # (N, B) [m], inf where nothing was hit
+    past_poses: FloatArray  # (N, D, 6) true and believed poses of the last ticks
 
 
 class Scratch(NamedTuple):
@@ -123,6 +139,7 @@ class BatchState:
     """A copy of every slot's state: see `ses_core.protocols.SimulatorState`."""
 
     poses: FloatArray
+    odometry: FloatArray
     velocities: FloatArray
     commands: FloatArray
     goals: FloatArray
@@ -140,7 +157,8 @@ def snapshot(slots: NDArray[np.void], *, time_step: float) -> BatchState:
     ahead_y = slots["local_goal_y"] - slots["y"]
     cosine, sine = np.cos(slots["yaw"]), np.sin(slots["yaw"])
     return BatchState(
-        poses=np.stack([slots["x"], slots["y"], slots["yaw"]], axis=1),
+        poses=np.stack([slots["true_x"], slots["true_y"], slots["true_yaw"]], axis=1),
+        odometry=np.stack([slots["x"], slots["y"], slots["yaw"]], axis=1),
         velocities=np.stack([slots["v"], slots["w"]], axis=1),
         commands=np.stack([slots["command_v"], slots["command_w"]], axis=1),
         goals=np.stack([slots["goal_x"], slots["goal_y"]], axis=1),

@@ -4,10 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from ses_core.arrays import BoolArray, ByteArray
-from ses_core.occupancy import OccupancyGrid
-from ses_core.planning.costmap import MARGIN_M, RESOLUTION_M
+from ses_core.occupancy import OccupancyGrid, cell_centres, cell_indices, occupied_at
+from ses_core.planning.costmap import FAR, MARGIN_M, RESOLUTION_M
 from ses_core.simulation.lidar import chessboard_clearance
 
 _IDLE_BYTES = 64 * 2**20
@@ -60,3 +61,28 @@ def describe_world(slot: NDArray[np.void], grid: OccupancyGrid) -> None:
     slot["map_x"], slot["map_y"] = grid.origin[0] - MARGIN_M, grid.origin[1] - MARGIN_M
     slot["map_width"] = int(np.ceil((grid.width_m + 2.0 * MARGIN_M) / RESOLUTION_M))
     slot["map_height"] = int(np.ceil((grid.height_m + 2.0 * MARGIN_M) / RESOLUTION_M))
+
+
+def known_map(slot: NDArray[np.void], grid: OccupancyGrid) -> tuple[ByteArray, ByteArray]:
+    """Give marks and squared distances (H, W) [cells^2] of a map that is known beforehand.
+
+    A cell of the robot's map is marked where its centre is occupied, or where the centre of an
+    occupied cell of the world lies in it.
+    """
+    shape = int(slot["map_height"]), int(slot["map_width"])
+    origin = (float(slot["map_x"]), float(slot["map_y"]))
+    blank = OccupancyGrid(
+        cells=np.zeros(shape, dtype=np.bool_), resolution=RESOLUTION_M, origin=origin
+    )
+    rows, columns = np.indices(shape)
+    centres = cell_centres(blank, np.column_stack((columns.ravel(), rows.ravel())))
+    marks = occupied_at(grid, centres, outside=False).reshape(shape)
+    occupied_rows, occupied_columns = np.nonzero(grid.cells)
+    walls = cell_indices(
+        blank, cell_centres(grid, np.column_stack((occupied_columns, occupied_rows)))
+    )
+    marks[walls[:, 1], walls[:, 0]] = True
+    squared = np.full(shape, FAR, dtype=np.float64)
+    if marks.any():
+        squared = np.rint(distance_transform_edt(~marks) ** 2)
+    return marks.astype(np.uint8), np.minimum(squared, FAR).astype(np.uint8)

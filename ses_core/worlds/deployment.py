@@ -1,7 +1,7 @@
 """A simulated fleet at work: a policy drives from start to goal, and everything is recorded.
 
 Steps are control ticks. Step k holds the pose at k ticks and the command under which the robot
-drove on from there; scans are taken at steps that the sensing rate divides.
+drove on from there; scans arrive at steps that the sensing rate divides.
 """
 
 from collections import deque
@@ -9,20 +9,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.random import Generator
 
 from ses_core.arrays import Float32Array, FloatArray, IntArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.geometry import wrap_angles
+from ses_core.imperfections import resolve
 from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters, observer_for
 from ses_core.navigation import NavigationTask
 from ses_core.protocols import Policy, Simulator
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.factory import SimulatorName, make_simulator
-
-ODOMETRY_DRIFT = 0.01
-"""Default error of odometry: 1 % of the way and of each turn, as good wheel odometry has it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +33,7 @@ class Deployment:
         odometry: (K, 3) [m, m, rad] what the robot believes, from (0, 0, 0) and drifting.
         measured: (K, 2) [m/s, rad/s].
         commands: (K - 1, 2) [m/s, rad/s]; command k was given at step k.
-        scan_steps: (S,) steps at which scans were taken.
+        scan_steps: (S,) steps at which scans were taken, which is before they arrived.
         ranges: (S, B) [m], inf where nothing came back.
     """
 
@@ -62,7 +59,6 @@ def deploy(
     profile: RobotProfile,
     simulator: SimulatorName = "batch",
     slots: int = 32,
-    odometry_drift: float = ODOMETRY_DRIFT,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Iterator[Deployment]:
     """Drive every task once and give each deployment as soon as it ends.
@@ -76,33 +72,9 @@ def deploy(
         simulator, slots=min(slots, len(tasks)), profile=profile, settings=simulation
     )
     try:
-        yield from _drive_all(
-            driver, tasks, policy, seed, simulation, profile, odometry_drift, progress
-        )
+        yield from _drive_all(driver, tasks, policy, seed, simulation, profile, progress)
     finally:
         driver.close()
-
-
-def drifting_odometry(poses: FloatArray, *, drift: float, rng: Generator) -> FloatArray:
-    """Give what wheel odometry makes of true poses (K, 3): (K, 3), beginning at (0, 0, 0).
-
-    The way driven and the turns are off by constant shares, and the heading wanders: each with
-    standard deviation `drift`, the heading's in radians per square root of a metre.
-    """
-    steps = np.diff(poses[:, :2], axis=0)
-    turns = wrap_angles(np.diff(poses[:, 2]))
-    cosine, sine = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
-    ahead, aside = (
-        cosine * steps[:, 0] + sine * steps[:, 1],
-        cosine * steps[:, 1] - sine * steps[:, 0],
-    )
-    way_error, turn_error = 1.0 + drift * rng.standard_normal(2)
-    wander = drift * np.sqrt(np.hypot(ahead, aside)) * rng.standard_normal(len(turns))
-    yaw = np.concatenate(([0.0], np.cumsum(turns * turn_error + wander)))
-    cosine, sine = np.cos(yaw[:-1]), np.sin(yaw[:-1])
-    x = np.cumsum(way_error * (cosine * ahead - sine * aside))
-    y = np.cumsum(way_error * (sine * ahead + cosine * aside))
-    return np.column_stack((np.append(0.0, x), np.append(0.0, y), wrap_angles(yaw)))
 
 
 def _drive_all(
@@ -112,7 +84,6 @@ def _drive_all(
     seed: int,
     simulation: SimulationSettings,
     profile: RobotProfile,
-    odometry_drift: float,
     progress: Callable[[float], None],
 ) -> Iterator[Deployment]:
     observer = observer_for(policy, profile)
@@ -142,9 +113,7 @@ def _drive_all(
         idle = np.flatnonzero(finished | (driven < 0))
         for slot in np.flatnonzero(finished).tolist():
             number = int(driven[slot])
-            task_seed = _task_seed(seed, number)
-            rng = np.random.default_rng(task_seed)
-            yield recorder.deployment(slot, number, tasks[number], task_seed, odometry_drift, rng)
+            yield recorder.deployment(slot, number, tasks[number], _task_seed(seed, number))
             done += 1
         progress(done / len(tasks))
 
@@ -162,7 +131,9 @@ class _Recorder:
         self._scan_every = max(1, round(simulation.control_rate_hz / simulation.sensing_rate_hz))
         steps = round(simulation.time_limit_s * simulation.control_rate_hz) + 1
         slots, scans = simulator.slots, (steps - 1) // self._scan_every + 1
+        self._scan_delay = resolve(simulation.imperfections).scan_delay_ticks
         self._poses = np.zeros((slots, steps, 3))
+        self._odometry = np.zeros((slots, steps, 3))
         self._measured = np.zeros((slots, steps, 2))
         self._commands = np.zeros((slots, steps, 2))
         self._ranges = np.zeros((slots, scans, beams), dtype=np.float32)
@@ -179,31 +150,24 @@ class _Recorder:
         moved = np.flatnonzero((ticks > self._steps) & (self._steps >= 0))
         self._write(moved, ticks[moved])
 
-    def deployment(
-        self,
-        slot: int,
-        number: int,
-        task: NavigationTask,
-        seed: int,
-        drift: float,
-        rng: Generator,
-    ) -> Deployment:
+    def deployment(self, slot: int, number: int, task: NavigationTask, seed: int) -> Deployment:
         """Copy what a finished slot has recorded."""
         last = int(self._steps[slot])
-        poses = self._poses[slot, : last + 1].copy()
-        scan_steps = np.arange(0, last + 1, self._scan_every)
+        arrivals = np.arange(0, last + 1, self._scan_every)
+        # What arrives before the first delay is over shows the start once more.
+        is_new = (arrivals == 0) | (arrivals > self._scan_delay)
         return Deployment(
             number=number,
             task=task,
             seed=seed,
             outcome=EpisodeOutcome(int(self._simulator.state().outcomes[slot])),
             times=np.arange(last + 1, dtype=np.float64) * self._simulator.time_step,
-            poses=poses,
-            odometry=drifting_odometry(poses, drift=drift, rng=rng),
+            poses=self._poses[slot, : last + 1].copy(),
+            odometry=_from_start(self._odometry[slot, : last + 1]),
             measured=self._measured[slot, : last + 1].copy(),
             commands=self._commands[slot, :last].copy(),
-            scan_steps=scan_steps,
-            ranges=self._ranges[slot, : len(scan_steps)].copy(),
+            scan_steps=np.maximum(arrivals - self._scan_delay, 0)[is_new],
+            ranges=self._ranges[slot, : len(arrivals)][is_new].copy(),
         )
 
     def _write(self, slots: IntArray, steps: IntArray) -> None:
@@ -211,6 +175,7 @@ class _Recorder:
             return
         state = self._simulator.state()
         self._poses[slots, steps] = state.poses[slots]
+        self._odometry[slots, steps] = state.odometry[slots]
         self._measured[slots, steps] = state.velocities[slots]
         later = steps > 0
         self._commands[slots[later], steps[later] - 1] = state.commands[slots[later]]
@@ -219,3 +184,16 @@ class _Recorder:
         if seeing.any():
             scans = self._simulator.scans()
             self._ranges[slots[seeing], steps[seeing] // self._scan_every] = scans[slots[seeing]]
+
+
+def _from_start(poses: FloatArray) -> FloatArray:
+    """Give poses (K, 3) [m, m, rad] in the frame of the first: odometry begins at (0, 0, 0)."""
+    away = poses - poses[0]
+    cosine, sine = np.cos(poses[0, 2]), np.sin(poses[0, 2])
+    return np.column_stack(
+        (
+            cosine * away[:, 0] + sine * away[:, 1],
+            cosine * away[:, 1] - sine * away[:, 0],
+            wrap_angles(away[:, 2]),
+        )
+    )

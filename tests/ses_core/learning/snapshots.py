@@ -12,6 +12,7 @@ class Snapshot:
     """Fields of `ses_core.protocols.SimulatorState`."""
 
     poses: FloatArray
+    odometry: FloatArray = field(default_factory=lambda: np.zeros((1, 3)))
     goals: FloatArray
     local_goals: FloatArray
     velocities: FloatArray = field(default_factory=lambda: np.zeros((1, 2)))

@@ -16,7 +16,7 @@ from ses_core.planning.costmap import (
     refresh_distances,
     work_in_scan,
 )
-from ses_core.simulation.tick import sense
+from ses_core.simulation.sensing import sense
 from tests.simulated import Kernel, course, get, hall, kernel, put, simulator
 
 

@@ -11,7 +11,6 @@ from ses_core.geometry import Pose2D
 from ses_core.planning.parameters import DWA_FAST, DWA_SLOW, PARAMETER_NAMES
 from ses_core.planning.rollouts import rollout_cost
 from ses_core.planning.trajectory_planner import (
-    OCCDIST_SCALE,
     _best_forward,
     _end_cost,
     _escape,
@@ -153,7 +152,7 @@ def test_the_pruned_search_finds_what_trying_every_sample_in_order_finds(seed: i
         x, y, _ = drive(get(k.slot, "x"), get(k.slot, "y"), get(k.slot, "yaw"), v, w, 2.0)
         column = (x - get(k.slot, "map_x")) / 0.05 - get(k.slot, "window_column") + 1.0
         row = (y - get(k.slot, "map_y")) / 0.05 - get(k.slot, "window_row") + 1.0
-        total = OCCDIST_SCALE * worst + _end_cost(
+        total = k.robot.occdist_scale * worst + _end_cost(
             k.memory.path_steps[0], k.memory.goal_steps[0], column, row, chosen
         )
         if total < math.inf and (best < 0 or total < best_cost):
@@ -164,16 +163,16 @@ def test_the_pruned_search_finds_what_trying_every_sample_in_order_finds(seed: i
 
 def test_after_turning_right_twice_turning_left_is_barred_until_moved() -> None:
     k = planned(course(hall()))
-    _note_oscillation(k.slot, 0.0, -0.5)
+    _note_oscillation(k.slot, k.robot, 0.0, -0.5)
     assert get(k.slot, "is_rotating_right")
     assert not get(k.slot, "is_stuck_right")
-    _note_oscillation(k.slot, 0.0, -0.5)
+    _note_oscillation(k.slot, k.robot, 0.0, -0.5)
     assert get(k.slot, "is_stuck_right")
     put(k.slot, x=get(k.slot, "x") + 0.04)
-    _note_oscillation(k.slot, 0.3, 0.0)
+    _note_oscillation(k.slot, k.robot, 0.3, 0.0)
     assert get(k.slot, "is_stuck_right")
     put(k.slot, x=get(k.slot, "x") + 0.02)
-    _note_oscillation(k.slot, 0.3, 0.0)
+    _note_oscillation(k.slot, k.robot, 0.3, 0.0)
     assert not get(k.slot, "is_stuck_right")
     assert not get(k.slot, "is_rotating_right")
 

@@ -11,7 +11,7 @@ from ses_core.robot_profile import JACKAL, TURTLEBOT4, LaserProfile
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.batch import BatchSimulator
 from tests.contracts.simulator import check_simulator
-from tests.simulated import CLEAN, course, drive_out, hall, kernel, parameters, simulator
+from tests.simulated import CLEAN, course, drive_out, flawed, hall, kernel, parameters, simulator
 
 BLIND = JACKAL.model_copy(update={"laser": LaserProfile(range_max_m=0.11)})
 
@@ -208,7 +208,7 @@ def test_planning_and_settling_tick_by_tick_is_advancing() -> None:
 
 
 def test_a_command_takes_effect_after_its_delay() -> None:
-    settings = CLEAN.model_copy(update={"command_delay_ticks": 2})
+    settings = flawed(command_delay_ticks=2)
     driven = simulator(course(hall()), settings=settings)
     speeds = []
     for _ in range(4):
@@ -218,13 +218,13 @@ def test_a_command_takes_effect_after_its_delay() -> None:
 
 
 def test_dropped_readings_are_lost_at_their_share() -> None:
-    settings = CLEAN.model_copy(update={"range_dropout": 0.3})
+    settings = flawed(range_dropout=0.3)
     driven = simulator(course(hall()), settings=settings)
     assert np.mean(np.isinf(driven.scans())) == pytest.approx(0.3, abs=0.06)
 
 
 def test_readings_are_noisy_by_the_setting() -> None:
-    settings = CLEAN.model_copy(update={"range_noise_m": 0.02})
+    settings = flawed(range_noise_m=0.02)
     difference = (
         simulator(course(hall()), settings=settings).scans() - simulator(course(hall())).scans()
     )

@@ -14,8 +14,9 @@ from ses_core.settings import SimulationSettings
 from ses_core.simulation.bullet import BulletSimulator, PhysicalSlot
 from ses_core.simulation.rendering import render
 from tests.contracts.simulator import check_simulator
+from tests.simulated import flawed
 
-CALM = SimulationSettings(actuation_noise=0.0, range_noise_m=0.0)
+CALM = SimulationSettings(imperfections="clean")
 PARAMETERS = DWA_SLOW.as_array()
 
 
@@ -41,11 +42,8 @@ def slot() -> Iterator[PhysicalSlot]:
 
 
 def _drive(slot: PhysicalSlot, v: float, w: float, seconds: float) -> list[bool]:
-    rng = np.random.default_rng(0)
     command = np.array([v, w])
-    return [
-        slot.drive(command, substeps=12, noise=0.0, rng=rng) for _ in range(round(seconds * 20))
-    ]
+    return [slot.drive(command, substeps=12) for _ in range(round(seconds * 20))]
 
 
 @pytest.mark.parametrize(
@@ -116,7 +114,7 @@ def test_robots_drive_through_a_hall_to_the_goal() -> None:
 
 
 def test_same_seed_same_drive_whatever_the_other_slots() -> None:
-    noisy = SimulationSettings(actuation_noise=0.1)
+    noisy = flawed(wheel_noise=0.1)
     alone = _simulate([_task(_hall())], settings=noisy, seconds=3)
     among = _simulate([_task(_hall()), _task(_hall(length=70))], settings=noisy, seconds=3)
     assert alone.state().poses[0].tolist() == among.state().poses[0].tolist()
