@@ -9,6 +9,7 @@ from prefect import task
 from prefect.cache_policies import NO_CACHE
 
 from ses_core.learning.policy_bundle import Lineage
+from ses_core.learning.reward import reward_of
 from ses_core.navigation import NavigationTask, environment_task
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, settings_json
 from ses_core.settings import Settings
@@ -25,7 +26,7 @@ from tasks.progress import report_progress
 
 
 def stop_at(deadline_stamp_s: float | None) -> Callable[[], bool]:
-    """Give the question a training asks after every second of driving: is it time to stop?"""
+    """Give the question a training asks after every decision: is it time to stop?"""
     return lambda: deadline_stamp_s is not None and time.time() >= deadline_stamp_s
 
 
@@ -154,7 +155,7 @@ def save_training(
         run_id: The run that asks, for the lineage.
         trained_in: What the tasks are, in words, for the card.
         settings: Training, simulation and target robot.
-        deadline: Asked after every second of driving whether to stop.
+        deadline: Asked after every decision whether to stop.
     """
     # torch and stable-baselines3 take seconds to import: only a training pays for them.
     from ses_core.learning.training import train
@@ -194,6 +195,7 @@ def save_training(
         ),
         profile=settings.target_robot,
         simulation=settings.simulation,
+        reward=reward_of(settings.training),
     )
     write_curve(directory, result.curve)
     write_record(directory / TRAINING_FILE, asdict(record))

@@ -9,9 +9,9 @@ from numpy.random import Generator
 
 from ses_core.arrays import Float32Array, FloatArray, IntArray
 from ses_core.geometry import Pose2D, compose
-from ses_core.learning.observation import ObservationSpec, goal_distances, make_observer
-from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters
-from ses_core.learning.reward import rewards
+from ses_core.learning.observation import ObservationSpec, make_observer
+from ses_core.learning.policies import DECISION_PERIOD_S, decision_ticks, initial_parameters
+from ses_core.learning.reward import nearness, reward_of, rewards, way_made
 from ses_core.navigation import NavigationTask
 from ses_core.occupancy import occupied_at
 from ses_core.planning.parameters import decode_action
@@ -39,7 +39,7 @@ class Decision:
 
 
 class DecisionProcess:
-    """N robots that get new planner parameters once per second of driving.
+    """N robots that get new planner parameters every so often, by default every second.
 
     Episodes start in tasks drawn from a list, at a start pose that is turned and shifted a
     little, so that a policy cannot learn one approach by heart.
@@ -53,6 +53,7 @@ class DecisionProcess:
         observation: ObservationSpec,
         profile: RobotProfile,
         settings: TrainingSettings,
+        decision_period: float = DECISION_PERIOD_S,
         weights: FloatArray | None = None,
     ) -> None:
         """Prepare the process; no slot runs before it is restarted.
@@ -62,7 +63,8 @@ class DecisionProcess:
             tasks: What episodes are drawn from.
             observation: What is seen.
             profile: The robot.
-            settings: Penalty and jitter.
+            settings: Reward and jitter.
+            decision_period: Driving between two decisions [s].
             weights: How often each task is drawn, in any scale; equally often without.
         """
         if not tasks:
@@ -74,9 +76,11 @@ class DecisionProcess:
         self._observer = make_observer(observation, profile)
         self._profile = profile
         self._settings = settings
-        self._ticks = max(1, round(DECISION_PERIOD_S / simulator.time_step))
+        self._reward = reward_of(settings)
+        self._ticks = decision_ticks(decision_period, simulator.time_step)
         self._parameters = initial_parameters(simulator.slots)
-        self._distances = np.zeros(simulator.slots)
+        self._starts = np.zeros((simulator.slots, 2))
+        self._way = np.zeros(simulator.slots)
 
     def restart(self, slots: IntArray, *, rng: Generator) -> None:
         """Start an episode in a task of its own in each of the slots (S,)."""
@@ -89,7 +93,9 @@ class DecisionProcess:
         ]
         self.simulator.reset(slots, tasks, rng.integers(2**31, size=len(slots)))
         self._parameters[slots] = initial_parameters(len(slots))
-        self._distances[slots] = goal_distances(self.simulator.state())[slots]
+        state = self.simulator.state()
+        self._starts[slots] = state.poses[slots, :2]
+        self._way[slots] = way_made(self._reward, state, self._starts)[slots]
 
     def observe(self) -> Float32Array:
         """Give what every robot sees now: (N, D)."""
@@ -99,17 +105,19 @@ class DecisionProcess:
         return observations.astype(np.float32)
 
     def decide(self, actions: FloatArray) -> Decision:
-        """Set parameters from actions (N, 7) in [-1, 1] and drive for a second."""
+        """Set parameters from actions (N, 7) in [-1, 1] and drive until the next decision."""
         self._parameters = decode_action(np.asarray(actions, dtype=np.float64))
         self.simulator.advance(self._parameters, self._ticks)
         state = self.simulator.state()
-        before, self._distances = self._distances, goal_distances(state)
+        before, self._way = self._way, way_made(self._reward, state, self._starts)
+        least_range = self._profile.laser.range_min_m
         return Decision(
             rewards=rewards(
-                before,
-                self._distances,
-                state.outcomes,
-                failure_penalty=self._settings.failure_penalty,
+                self._reward,
+                before=before,
+                after=self._way,
+                outcomes=state.outcomes,
+                near=nearness(self.simulator.scans(), least_range=least_range),
             ),
             outcomes=state.outcomes,
             times=state.times,
