@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
-from ses_core.robot_profile import JACKAL, RobotProfile
+from ses_core.robot_profile import JACKAL, KNOWN_PROFILES, RobotProfile
 from ses_core.settings_model import SettingsModel
 
 
@@ -281,4 +281,18 @@ class Settings(SettingsModel):
     training: TrainingSettings = TrainingSettings()
     evaluation: EvaluationSettings = EvaluationSettings()
     store: StoreSettings = StoreSettings()
-    target_robot: RobotProfile = Field(JACKAL, description="The robot that is trained.")
+    target_robot: RobotProfile = Field(
+        JACKAL, description="The robot that is trained: a profile, or the name of one."
+    )
+
+    @field_validator("target_robot", mode="before")
+    @classmethod
+    def _named_profile(cls, value: object, info: ValidationInfo) -> object:
+        """Look a profile up where only its name is given."""
+        if not isinstance(value, str):
+            return value
+        ingest = info.data.get("ingest", IngestSettings())
+        profiles = {**KNOWN_PROFILES, **ingest.profiles}
+        if value not in profiles:
+            raise ValueError(f"no robot profile has that name, expected {', '.join(profiles)}")
+        return profiles[value]
