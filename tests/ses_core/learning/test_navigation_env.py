@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import gymnasium.utils.env_checker as gymnasium_checker
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 import stable_baselines3.common.env_checker as learner_checker
 
+from ses_core.geometry import Pose2D
 from ses_core.learning.navigation_env import NavigationEnv
 from ses_core.navigation import NavigationTask
 from ses_core.robot_profile import JACKAL, TURTLEBOT4, RobotProfile
@@ -109,6 +111,17 @@ def test_a_failure_costs_the_penalty() -> None:
         _, reward, terminated, _, info = env.step(0.0 * FASTEST)
     assert info["outcome"] in {"stuck", "collision"}
     assert reward < -17.0
+
+
+def test_nearness_costs_where_the_settings_give_it_a_weight() -> None:
+    beside_the_wall = replace(corridor(), start=Pose2D(1.0, 0.39, 0.0))
+    earned = {}
+    for weight in (0.0, 0.1):
+        env = make_env(beside_the_wall, settings=TrainingSettings(collision_weight=weight))
+        env.reset(seed=0)
+        earned[weight] = env.step(-FASTEST)[1]
+    # The wall is 0.24 m away at first, and not much farther a second later.
+    assert 0.1 / 0.35 < earned[0.0] - earned[0.1] < 0.1 / 0.25
 
 
 def test_actions_act() -> None:
