@@ -109,16 +109,13 @@ def pretrain_policy(
 ) -> TrainingRecord:
     """Train from random weights, by default as the shipped original policy was."""
     from ses_core.learning.pretraining import (
-        PRETRAINING,
         PRETRAINING_SIMULATION,
         generated_worlds,
+        pretraining,
         training_tasks,
     )
 
-    asked = {"steps": steps, "seed": seed}
-    training = PRETRAINING.model_copy(
-        update={name: value for name, value in asked.items() if value is not None}
-    )
+    training = pretraining(settings.training, steps=steps, seed=seed)
     chosen = (
         read_worlds(worlds, part=part, resolution=resolution)
         if worlds
