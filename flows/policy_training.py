@@ -41,7 +41,7 @@ def pretrain(
         resolution: Of images that carry none [m per pixel].
         steps: Decisions to train; else those of the shipped policy.
         seed: Of weights, exploration and simulation.
-        settings: Target robot.
+        settings: Those of `training` but its length, and the target robot.
     """
     record = pretrain_policy.submit(
         worlds, part=part, resolution=resolution, steps=steps, seed=seed, out=out, settings=settings

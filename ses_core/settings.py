@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator
 
 from ses_core.imperfections import Imperfections, PresetName
-from ses_core.robot_profile import JACKAL, RobotProfile
+from ses_core.robot_profile import JACKAL, KNOWN_PROFILES, RobotProfile
 from ses_core.settings_model import SettingsModel
 
 
@@ -216,16 +216,29 @@ class TrainingSettings(SettingsModel):
     """Fine-tuning of the parameter policy (APPLR)."""
 
     algorithm: Literal["ppo", "td3", "sac"] = Field("ppo", description="stable-baselines3's.")
-    steps: int = Field(100_000, ge=1, description="Decisions trained, one per second of driving.")
+    steps: int = Field(100_000, ge=1, description="Decisions trained.")
+    decision_period_s: float | None = Field(
+        None,
+        gt=0,
+        description="Driving between two decisions, in whole control ticks; else that of the "
+        "policy gone on from, or 1 s.",
+    )
     seed: int = Field(0, ge=0, description="Seed of weights, exploration and simulation.")
     learning_rate: float | None = Field(None, gt=0, description="Else the algorithm's preset.")
     gamma: float = Field(0.98, gt=0, lt=1, description="Discount per decision.")
-    failure_penalty: float = Field(20.0, ge=0, description="Taken off when an episode fails.")
+    failure_penalty: float | None = Field(
+        None, ge=0, description="Taken off when an episode fails; else the preset's."
+    )
+    collision_weight: float | None = Field(
+        None,
+        ge=0,
+        description="Nearness within 0.3 m costs this / (nearness + 0.05 m); else the preset's.",
+    )
     parallel_envs: int = Field(100, ge=1, description="Worlds stepped together.")
-    preset: Literal["default", "authors"] = Field(
+    preset: Literal["default", "authors", "paper"] = Field(
         "default",
-        description="Observation and network of a policy without a parent, and the algorithm's "
-        "constants: ours, or those of the authors' code.",
+        description="Reward, constants of TD3 and SAC, and the observation and network of a "
+        "policy without a parent: ours, those of the authors' code, or those of APPLR.",
     )
     critic_share: float = Field(
         0.1, ge=0, lt=1, description="Share of a fine-tuning that trains the new critic alone."
@@ -271,4 +284,18 @@ class Settings(SettingsModel):
     training: TrainingSettings = TrainingSettings()
     evaluation: EvaluationSettings = EvaluationSettings()
     store: StoreSettings = StoreSettings()
-    target_robot: RobotProfile = Field(JACKAL, description="The robot that is trained.")
+    target_robot: RobotProfile = Field(
+        JACKAL, description="The robot that is trained: a profile, or the name of one."
+    )
+
+    @field_validator("target_robot", mode="before")
+    @classmethod
+    def _named_profile(cls, value: object, info: ValidationInfo) -> object:
+        """Look a profile up where only its name is given."""
+        if not isinstance(value, str):
+            return value
+        ingest = info.data.get("ingest", IngestSettings())
+        profiles = {**KNOWN_PROFILES, **ingest.profiles}
+        if value not in profiles:
+            raise ValueError(f"no robot profile has that name, expected {', '.join(profiles)}")
+        return profiles[value]

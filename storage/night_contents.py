@@ -60,6 +60,7 @@ def gather_night(night: NightArtifacts, *, store: LocalArtifactStore) -> NightRe
     return NightReport(
         run_id=night.run_id,
         batch_date=night.batch_date.isoformat(),
+        robot=night.settings.target_robot,
         decision=Decision(verdict=night.decision.replace("-", " "), reasons=night.reasons),
         logs=_taken(logs[logs["log_id"].isin(night.log_ids)], scenarios),
         refused=tuple(

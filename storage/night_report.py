@@ -1,5 +1,6 @@
 """`NightReport`: everything the page of one night shows, as plain data."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -9,6 +10,7 @@ from ses_core.evaluation.episodes import Episode
 from ses_core.evaluation.statistics import PolicySummary
 from ses_core.extraction.funnel import FunnelStep
 from ses_core.learning.training_curve import CurvePoint
+from ses_core.robot_profile import RobotProfile
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,6 +155,7 @@ class NightReport:
     """One night.
 
     Attributes:
+        robot: The robot that everything is for: trained, measured, and able to cross.
         challenging: Chosen environments, hardest first; the page shows the first ones.
         synthesized: Environments that were trained in.
         pictures: Further pictures: logs over their paths, rendered worlds.
@@ -162,6 +165,7 @@ class NightReport:
 
     run_id: str
     batch_date: str
+    robot: RobotProfile
     decision: Decision
     logs: tuple[TakenLog, ...] = ()
     refused: tuple[RefusedLog, ...] = ()
@@ -202,6 +206,20 @@ def headline(report: NightReport) -> str:
         f"{_percent(rates[comparison.policy])} of trials, the policy it came from in "
         f"{_percent(rates[comparison.baseline])}: {report.decision.verdict}, {ending}."
     )
+
+
+def describe_robot(profile: RobotProfile) -> str:
+    """Say in a few words what body and laser a robot has."""
+    if profile.radius_m > 0:
+        body = f"round, {2 * profile.radius_m:.2f} m across"
+    else:
+        (back, front), (right, left) = (
+            (min(side), max(side)) for side in zip(*profile.footprint_m, strict=True)
+        )
+        body = f"{front - back:.2f} m long and {left - right:.2f} m wide"
+    laser = profile.laser
+    view = math.degrees(laser.angle_max_rad - laser.angle_min_rad)
+    return f"{body}, laser of {laser.beams} beams over {view:.0f}\N{DEGREE SIGN}"
 
 
 def _against_parent(parent: str, evaluation: EvaluationUse | None) -> Comparison | None:

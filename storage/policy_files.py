@@ -15,6 +15,7 @@ from ses_core.learning.policy_bundle import (
     pack_bundle,
     unpack_bundle,
 )
+from ses_core.learning.reward import RewardSpec
 from ses_core.learning.training_curve import CurvePoint
 from ses_core.protocols import Policy
 from ses_core.robot_profile import RobotProfile
@@ -51,10 +52,13 @@ def write_policy(
     lineage: Lineage,
     profile: RobotProfile,
     simulation: SimulationSettings,
+    reward: RewardSpec,
 ) -> None:
     """Write a bundle into a folder, which is made if it is missing."""
     directory.mkdir(parents=True, exist_ok=True)
-    files = pack_bundle(policy, lineage=lineage, profile=profile, simulation=simulation)
+    files = pack_bundle(
+        policy, lineage=lineage, profile=profile, simulation=simulation, reward=reward
+    )
     for name, content in files.items():
         (directory / name).write_bytes(content)
 

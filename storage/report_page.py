@@ -13,9 +13,10 @@ from ses_core.pictures.figures import DARK, LIGHT, Theme
 from ses_core.pictures.funnel import funnel_figure
 from ses_core.pictures.gallery import thumbnail
 from ses_core.pictures.learning_curve import draw_learning_curve
+from ses_core.pictures.robot_figure import robot_figure
 from ses_core.pictures.threshold_sensitivity import threshold_sensitivity_figure
 from storage.durable_files import replace_file
-from storage.night_report import NightReport, ShownEnvironment, headline
+from storage.night_report import NightReport, ShownEnvironment, describe_robot, headline
 
 GALLERY_LIMIT = 200
 """Most pictures in a gallery, so that the page opens at once; the rest is counted."""
@@ -59,6 +60,7 @@ def render_page(report: NightReport) -> str:
     return environment.get_template("night.html").render(
         report=report,
         headline=headline(report),
+        robot_words=describe_robot(report.robot),
         pictures=_pictures(report),
         gallery_limit=GALLERY_LIMIT,
         gallery_opening=GALLERY_OPENING,
@@ -88,6 +90,11 @@ def _pictures(report: NightReport) -> dict[str, Markup]:
                 scenario_count=sensitivity.scenario_count,
                 theme=theme,
             ),
+        )
+    if report.synthesized or report.training or report.evaluation:
+        drawings["robot"] = (
+            f"footprint of {report.robot.name}",
+            lambda theme: robot_figure(report.robot, theme=theme),
         )
     if report.training and (curve := report.training.curve):
         drawings["curve"] = (

@@ -9,6 +9,7 @@ from prefect import task
 from prefect.cache_policies import NO_CACHE
 
 from ses_core.learning.policy_bundle import Lineage
+from ses_core.learning.reward import reward_of
 from ses_core.navigation import NavigationTask, environment_task
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, settings_json
 from ses_core.settings import Settings
@@ -25,7 +26,7 @@ from tasks.progress import report_progress
 
 
 def stop_at(deadline_stamp_s: float | None) -> Callable[[], bool]:
-    """Give the question a training asks after every second of driving: is it time to stop?"""
+    """Give the question a training asks after every decision: is it time to stop?"""
     return lambda: deadline_stamp_s is not None and time.time() >= deadline_stamp_s
 
 
@@ -108,16 +109,13 @@ def pretrain_policy(
 ) -> TrainingRecord:
     """Train from random weights, by default as the shipped original policy was."""
     from ses_core.learning.pretraining import (
-        PRETRAINING,
         PRETRAINING_SIMULATION,
         generated_worlds,
+        pretraining,
         training_tasks,
     )
 
-    asked = {"steps": steps, "seed": seed}
-    training = PRETRAINING.model_copy(
-        update={name: value for name, value in asked.items() if value is not None}
-    )
+    training = pretraining(settings.training, steps=steps, seed=seed)
     chosen = (
         read_worlds(worlds, part=part, resolution=resolution)
         if worlds
@@ -154,7 +152,7 @@ def save_training(
         run_id: The run that asks, for the lineage.
         trained_in: What the tasks are, in words, for the card.
         settings: Training, simulation and target robot.
-        deadline: Asked after every second of driving whether to stop.
+        deadline: Asked after every decision whether to stop.
     """
     # torch and stable-baselines3 take seconds to import: only a training pays for them.
     from ses_core.learning.training import train
@@ -194,6 +192,7 @@ def save_training(
         ),
         profile=settings.target_robot,
         simulation=settings.simulation,
+        reward=reward_of(settings.training),
     )
     write_curve(directory, result.curve)
     write_record(directory / TRAINING_FILE, asdict(record))

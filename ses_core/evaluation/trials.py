@@ -10,7 +10,7 @@ import numpy as np
 
 from ses_core.evaluation.episodes import BARN_SPEED_MPS, Episode, barn_score
 from ses_core.evaluation.outcomes import EpisodeOutcome
-from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters, observer_for
+from ses_core.learning.policies import initial_parameters, observer_for, policy_ticks
 from ses_core.navigation import NavigationTask
 from ses_core.planning.global_planner import optimal_path_length
 from ses_core.protocols import Policy, Simulator
@@ -148,7 +148,7 @@ def _drive(
 ) -> list[Episode]:
     """Drive one policy through the schedule, refilling slots as episodes end."""
     observer = observer_for(policy, profile)
-    ticks = max(1, round(DECISION_PERIOD_S / simulator.time_step))
+    ticks = policy_ticks(policy, simulator.time_step)
     waiting = deque(range(len(schedule)))
     driven = np.full(simulator.slots, -1)
     parameters = initial_parameters(simulator.slots)

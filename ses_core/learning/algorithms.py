@@ -6,6 +6,7 @@ tangent, so that any of them can go on from what any other has trained.
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -19,7 +20,6 @@ from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
 from ses_core.arrays import Float32Array
-from ses_core.learning.observation import ObservationSpec
 from ses_core.learning.policies import ParameterPolicy
 from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.settings import TrainingSettings
@@ -40,6 +40,31 @@ _NOISE = (0.2, 0.05)
 
 _BUFFER = 200_000
 """Transitions kept by TD3 and SAC (ros_jackal's `configs/laser.yaml`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _OffPolicyPreset:
+    """Constants of TD3 and SAC that differ from preset to preset.
+
+    Attributes:
+        rate: Learning rate; None leaves it to the algorithm.
+        updates: Updates per decision.
+        steps_of_return: Decisions whose rewards are summed before the critic is asked.
+    """
+
+    rate: float | None
+    updates: float
+    steps_of_return: int
+
+
+_OFF_POLICY = {
+    "default": _OffPolicyPreset(rate=None, updates=0.25, steps_of_return=1),
+    "authors": _OffPolicyPreset(rate=1e-5, updates=1.0, steps_of_return=4),
+    "paper": _OffPolicyPreset(rate=2e-4, updates=0.1, steps_of_return=4),
+}
+"""Ours; ros_jackal's `configs/laser.yaml`; the actor's rate of APPLR's `td3_condor.json`.
+
+A quarter of the authors' updates costs a quarter of the time and teaches nearly as much."""
 
 
 class _SquashedMeanPolicy(ActorCriticPolicy):
@@ -121,15 +146,15 @@ def actor_parameters(learner: BaseAlgorithm) -> list[nn.Parameter]:
     return own
 
 
-def extract_policy(learner: BaseAlgorithm, observation: ObservationSpec) -> ParameterPolicy:
-    """Copy a learner's actor into a policy that needs no torch."""
+def extract_policy(learner: BaseAlgorithm, start: ParameterPolicy) -> ParameterPolicy:
+    """Copy a learner's actor into a policy that needs no torch, like its start in all else."""
     layers = actor_layers(learner)
 
     def copied(tensor: torch.Tensor) -> Float32Array:
         return tensor.detach().cpu().numpy().astype(np.float32, copy=True)
 
-    return ParameterPolicy(
-        observation=observation,
+    return replace(
+        start,
         weights=tuple(copied(layer.weight) for layer in layers),
         biases=tuple(copied(layer.bias) for layer in layers),
     )
@@ -172,12 +197,12 @@ def _make_ppo(
 def _make_td3(
     env: VecEnv, hidden: list[int], settings: TrainingSettings, _: float
 ) -> tuple[TD3, int]:
-    """Make TD3; the authors' one-rate form, for stable-baselines3 has no second learning rate."""
+    """Make TD3 in its one-rate form, for stable-baselines3 has no second learning rate."""
     rounds = max(1, settings.steps // env.num_envs)
     learner = TD3(
         "MlpPolicy",
         env,
-        **_off_policy(env, hidden, settings, rounds=rounds, rate=1e-4, authors_rate=1e-5),
+        **_off_policy(env, hidden, settings, rounds=rounds, rate=1e-4),
         action_noise=_FadingNoise(*_NOISE, decisions=rounds),
         policy_delay=2,
     )
@@ -192,7 +217,7 @@ def _make_sac(
     learner = SAC(
         "MlpPolicy",
         env,
-        **_off_policy(env, hidden, settings, rounds=rounds, rate=3e-4, authors_rate=1e-5),
+        **_off_policy(env, hidden, settings, rounds=rounds, rate=3e-4),
         ent_coef="auto_0.02",
     )
     return learner, rounds * env.num_envs
@@ -205,23 +230,18 @@ def _off_policy(
     *,
     rounds: int,
     rate: float,
-    authors_rate: float,
 ) -> dict[str, Any]:
-    """Give what TD3 and SAC have in common.
-
-    The authors make one update per decision, with returns over 4 decisions; a quarter of the
-    updates costs a quarter of the time and teaches nearly as much (their later code does it).
-    """
-    is_authors = settings.preset == "authors"
+    """Give what TD3 and SAC have in common; `rate` is for presets that have none."""
+    preset = _OFF_POLICY[settings.preset]
     return {
-        "learning_rate": settings.learning_rate or (authors_rate if is_authors else rate),
+        "learning_rate": settings.learning_rate or preset.rate or rate,
         "buffer_size": max(env.num_envs, min(_BUFFER, rounds * env.num_envs)),
         "learning_starts": 0,
         "batch_size": 128,
         "gamma": settings.gamma,
         "train_freq": 1,
-        "gradient_steps": max(1, round(env.num_envs * (1.0 if is_authors else 0.25))),
-        "n_steps": 4 if is_authors else 1,
+        "gradient_steps": max(1, round(env.num_envs * preset.updates)),
+        "n_steps": preset.steps_of_return,
         "policy_kwargs": {"net_arch": hidden, "activation_fn": nn.ReLU},
         "seed": settings.seed,
         "device": "cpu",

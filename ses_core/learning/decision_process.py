@@ -1,6 +1,5 @@
 """`DecisionProcess`: what one decision does, shared by the Gymnasium env and its vector form."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,18 +8,16 @@ from numpy.random import Generator
 
 from ses_core.arrays import Float32Array, FloatArray, IntArray
 from ses_core.geometry import Pose2D, compose
-from ses_core.learning.observation import ObservationSpec, goal_distances, make_observer
-from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters
-from ses_core.learning.reward import rewards
+from ses_core.learning.observation import ObservationSpec, make_observer
+from ses_core.learning.policies import DECISION_PERIOD_S, decision_ticks, initial_parameters
+from ses_core.learning.reward import nearness, reward_of, rewards, way_made
 from ses_core.navigation import NavigationTask
 from ses_core.occupancy import occupied_at
 from ses_core.planning.parameters import decode_action
 from ses_core.protocols import Simulator
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import TrainingSettings
-
-_BODY_POINTS = 8
-"""Points per edge of the body that must be free where an episode starts."""
+from ses_core.simulation.episode_start import padded_outline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +36,7 @@ class Decision:
 
 
 class DecisionProcess:
-    """N robots that get new planner parameters once per second of driving.
+    """N robots that get new planner parameters every so often, by default every second.
 
     Episodes start in tasks drawn from a list, at a start pose that is turned and shifted a
     little, so that a policy cannot learn one approach by heart.
@@ -53,6 +50,7 @@ class DecisionProcess:
         observation: ObservationSpec,
         profile: RobotProfile,
         settings: TrainingSettings,
+        decision_period: float = DECISION_PERIOD_S,
         weights: FloatArray | None = None,
     ) -> None:
         """Prepare the process; no slot runs before it is restarted.
@@ -62,7 +60,8 @@ class DecisionProcess:
             tasks: What episodes are drawn from.
             observation: What is seen.
             profile: The robot.
-            settings: Penalty and jitter.
+            settings: Reward and jitter.
+            decision_period: Driving between two decisions [s].
             weights: How often each task is drawn, in any scale; equally often without.
         """
         if not tasks:
@@ -74,9 +73,11 @@ class DecisionProcess:
         self._observer = make_observer(observation, profile)
         self._profile = profile
         self._settings = settings
-        self._ticks = max(1, round(DECISION_PERIOD_S / simulator.time_step))
+        self._reward = reward_of(settings)
+        self._ticks = decision_ticks(decision_period, simulator.time_step)
         self._parameters = initial_parameters(simulator.slots)
-        self._distances = np.zeros(simulator.slots)
+        self._starts = np.zeros((simulator.slots, 2))
+        self._way = np.zeros(simulator.slots)
 
     def restart(self, slots: IntArray, *, rng: Generator) -> None:
         """Start an episode in a task of its own in each of the slots (S,)."""
@@ -89,7 +90,9 @@ class DecisionProcess:
         ]
         self.simulator.reset(slots, tasks, rng.integers(2**31, size=len(slots)))
         self._parameters[slots] = initial_parameters(len(slots))
-        self._distances[slots] = goal_distances(self.simulator.state())[slots]
+        state = self.simulator.state()
+        self._starts[slots] = state.poses[slots, :2]
+        self._way[slots] = way_made(self._reward, state, self._starts)[slots]
 
     def observe(self) -> Float32Array:
         """Give what every robot sees now: (N, D)."""
@@ -99,17 +102,19 @@ class DecisionProcess:
         return observations.astype(np.float32)
 
     def decide(self, actions: FloatArray) -> Decision:
-        """Set parameters from actions (N, 7) in [-1, 1] and drive for a second."""
+        """Set parameters from actions (N, 7) in [-1, 1] and drive until the next decision."""
         self._parameters = decode_action(np.asarray(actions, dtype=np.float64))
         self.simulator.advance(self._parameters, self._ticks)
         state = self.simulator.state()
-        before, self._distances = self._distances, goal_distances(state)
+        before, self._way = self._way, way_made(self._reward, state, self._starts)
+        least_range = self._profile.laser.range_min_m
         return Decision(
             rewards=rewards(
-                before,
-                self._distances,
-                state.outcomes,
-                failure_penalty=self._settings.failure_penalty,
+                self._reward,
+                before=before,
+                after=self._way,
+                outcomes=state.outcomes,
+                near=nearness(self.simulator.scans(), least_range=least_range),
             ),
             outcomes=state.outcomes,
             times=state.times,
@@ -123,15 +128,6 @@ def jittered(
     yaw = rng.uniform(-1.0, 1.0) * settings.start_yaw_jitter_rad
     sideways = rng.uniform(-1.0, 1.0) * settings.start_sideways_jitter_m
     start = compose(task.start, Pose2D(0.0, sideways, yaw))
-    if occupied_at(task.world.grid, _outline(start, profile)).any():
+    if occupied_at(task.world.grid, padded_outline(start, profile)).any():
         return task
     return replace(task, start=start)
-
-
-def _outline(pose: Pose2D, profile: RobotProfile) -> FloatArray:
-    """Points (P, 2) [m] along the edge of the padded body at a pose."""
-    corners = np.array(profile.padded_footprint())
-    along = np.linspace(0.0, 1.0, _BODY_POINTS, endpoint=False)[:, None, None]
-    edge = ((1.0 - along) * corners + along * np.roll(corners, -1, axis=0)).reshape(-1, 2)
-    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
-    return edge @ np.array([[cosine, sine], [-sine, cosine]]) + np.array([pose.x, pose.y])

@@ -10,7 +10,8 @@ from gymnasium.spaces import Box, Space
 from ses_core.arrays import Float32Array, FloatArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.learning.decision_process import DecisionProcess
-from ses_core.learning.observation import DEFAULT_OBSERVATION, ObservationSpec
+from ses_core.learning.observation import ObservationSpec, observation_for
+from ses_core.learning.policies import DECISION_PERIOD_S
 from ses_core.navigation import NavigationTask
 from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.protocols import Simulator
@@ -36,8 +37,12 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
 
     ## Description
     A robot drives from a start to a goal through a world it does not know, under a whole
-    navigation stack: laser, costmap, global plan, DWA local planner. Once per second the agent
-    sets seven of the planner's parameters (APPLR; section IV-A of the paper).
+    navigation stack: laser, costmap, global plan, DWA local planner. Every `decision_period_s`
+    of the settings, by default once per second, the agent sets seven of the planner's parameters
+    (APPLR; section IV-A of the paper). One name, the `preset` of the settings, chooses what is
+    seen and what is rewarded: `default` is ours, `authors` is that of the SES authors' code
+    (ros_jackal), `paper` is that of APPLR: the paper prints neither and refers to APPLR, whose
+    own repository the values are from.
 
     ## Action Space
     `Box(-1, 1, (7,), float32)`, mapped linearly to
@@ -53,18 +58,38 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
     | 6 | `inflation_radius` | 0.1 | 0.6 | m |
 
     ## Observation Space
-    `Box((129,), float32)` by default; `ses_core.learning.observation` has the units.
+    `Box((D,), float32)`; a row that a preset lacks is left out, and the rest moves up.
 
-    | # | what | min | max |
-    | --- | --- | --- | --- |
-    | 0-119 | nearest laser reading per sector, right to left | -0.5 | 0.5 |
-    | 120 | angle to the local goal | -0.5 | 0.5 |
-    | 121 | distance to the goal | -0.5 | 0.5 |
-    | 122-128 | parameters in force | -1 | 1 |
+    | what | min | max | `default` | `authors` | `paper` |
+    | --- | --- | --- | --- | --- | --- |
+    | nearest laser reading per sector, right to left | -0.5 | 0.5 | 120 | 720 | 720 |
+    | angle to the local goal, 1 m ahead on the plan | -0.5 | 0.5 | 1 | 1 | 1 |
+    | straight distance to the goal, 10 m at most | -0.5 | 0.5 | 1 | | |
+    | parameters in force | -1 | 1 | 7 | | 7 |
+    | D | | | 129 | 721 | 728 |
+
+    Readings r [m] up to c are scaled to r / c - 1/2; c is 4 m in `default`, 2 m in the others.
+    The sectors span what the robot's laser sees: 270 degrees on a Jackal, 360 on a TurtleBot 4.
+    `ses_core.learning.observation` has the formulas.
 
     ## Rewards
-    Metres of progress towards the goal in that second (at most about 2), +20 on success,
-    minus the failure penalty (20) on a collision, a time-out or getting stuck.
+    w (g after - before) + success - penalty - collision, where *before* and *after* are the way
+    made [m], of one decision (`ses_core.learning.reward`).
+
+    | term | `default` | `authors` | `paper` |
+    | --- | --- | --- | --- |
+    | the way is measured | straight to the goal | along start-goal | along start-goal |
+    | w per metre | 1 | 1 | 0.5 |
+    | g | 1 | 1 | 0.99 |
+    | success, when the goal is reached | 20 | 20 | 10 |
+    | penalty, on a collision, a time-out or getting stuck | 20 | 0 | 0 |
+    | collision, k / (d + 0.05 m) where d < 0.3 m | k = 0 | k = 0 | k = 0 |
+
+    d is the mean of the 10 nearest readings. With k = 0 and decisions a second apart, a reward
+    lies in about [-22, 22]; `failure_penalty` and `collision_weight` of the settings replace
+    the penalty and k. Both sources let the robot touch obstacles and go on; here contact ends
+    the episode unless `collisions_end` is off. Their start-goal line is the y axis of BARN's
+    worlds. APPLR's terms on the parameters themselves (smoothness, extremes) are left out.
 
     ## Starting State
     A task drawn from the list, its start turned and shifted by a small random amount, the
@@ -77,8 +102,8 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
     Never: the time limit of 100 s belongs to the task, and missing it is a failure.
 
     ## Arguments
-    The simulator (one slot) is made and closed by the caller; `info` has the `outcome` and,
-    in seconds, the `time`.
+    The simulator (one slot) is made and closed by the caller. Without an `observation` the
+    preset's is seen. `info` has the `outcome` and, in seconds, the `time`.
     """
 
     def __init__(
@@ -86,13 +111,15 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
         simulator: Simulator,
         *,
         tasks: Sequence[NavigationTask],
-        observation: ObservationSpec = DEFAULT_OBSERVATION,
+        observation: ObservationSpec | None = None,
         profile: RobotProfile = JACKAL,
         settings: TrainingSettings | None = None,
         weights: FloatArray | None = None,
     ) -> None:
         if simulator.slots != 1:
             raise ValueError(f"simulator has {simulator.slots} slots, expected 1")
+        settings = settings or TrainingSettings()
+        observation = observation or observation_for(settings.preset, profile)
         self.observation_space = observation_space(observation)
         self.action_space = action_space()
         self._process = DecisionProcess(
@@ -100,7 +127,8 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
             tasks=tasks,
             observation=observation,
             profile=profile,
-            settings=settings or TrainingSettings(),
+            settings=settings,
+            decision_period=settings.decision_period_s or DECISION_PERIOD_S,
             weights=weights,
         )
 
@@ -113,7 +141,7 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
         return self._process.observe()[0], {}
 
     def step(self, action: Float32Array) -> tuple[Float32Array, float, bool, bool, dict[str, Any]]:
-        """Drive for a second under the parameters that an action (7,) stands for."""
+        """Drive until the next decision under the parameters that an action (7,) stands for."""
         decision = self._process.decide(np.asarray(action, dtype=np.float64)[None])
         outcome = EpisodeOutcome(int(decision.outcomes[0]))
         info = {"outcome": outcome.name.lower(), "time": float(decision.times[0])}

@@ -70,12 +70,33 @@ class ObservationSpec(SettingsModel):
 AUTHORS_OBSERVATION = ObservationSpec(name="authors", sectors=720, laser_clip_m=2.0)
 """721 numbers, as ros_jackal's `dwa_base_envs.py` with the clip of its `configs/laser.yaml`."""
 
+PAPER_OBSERVATION = ObservationSpec(
+    name="paper", sectors=720, laser_clip_m=2.0, has_parameters=True
+)
+"""728 numbers. The paper names no observation and refers to APPLR: `jackal_env_continuous.py` of
+its repository with the clip of `td3_condor.json`; angle and parameters are scaled as ours are."""
+
 DEFAULT_OBSERVATION = ObservationSpec(
     name="default", sectors=120, laser_clip_m=4.0, goal_clip_m=10.0, has_parameters=True
 )
 """129 numbers: three quarters of a learner's arithmetic is in the 720-wide first layer."""
 
-OBSERVATIONS = {spec.name: spec for spec in (AUTHORS_OBSERVATION, DEFAULT_OBSERVATION)}
+OBSERVATIONS = {
+    spec.name: spec for spec in (DEFAULT_OBSERVATION, AUTHORS_OBSERVATION, PAPER_OBSERVATION)
+}
+
+
+def observation_for(preset: str, profile: RobotProfile) -> ObservationSpec:
+    """Give a preset's observation with its sectors over all that a robot's laser sees.
+
+    A laser whose view reaches beyond straight behind the robot is taken to see all round.
+    """
+    laser = profile.laser
+    right = laser.angle_min_rad + laser.mount_yaw_rad
+    left = laser.angle_max_rad + laser.mount_yaw_rad
+    if not -np.pi < right < left < np.pi:
+        right, left = -float(np.pi), float(np.pi)
+    return OBSERVATIONS[preset].model_copy(update={"sector_min_rad": right, "sector_max_rad": left})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,8 +133,9 @@ class Observer:
             np.arctan2(ahead[:, 1:], ahead[:, :1]) / (2.0 * np.pi),
         ]
         if self.spec.goal_clip_m is not None:
-            away = np.minimum(goal_distances(state)[:, None], self.spec.goal_clip_m)
-            parts.append(away / self.spec.goal_clip_m - 0.5)
+            # From where the robot believes to be: it knows no other place.
+            away = np.linalg.norm(state.goals - state.odometry[:, :2], axis=1, keepdims=True)
+            parts.append(np.minimum(away, self.spec.goal_clip_m) / self.spec.goal_clip_m - 0.5)
         if self.spec.has_parameters:
             parts.append(encode_parameters(parameters))
         return np.hstack(parts)
@@ -144,7 +166,7 @@ def make_observer(spec: ObservationSpec, profile: RobotProfile) -> Observer:
 
 
 def goal_distances(state: SimulatorState) -> FloatArray:
-    """Give the straight distance (N,) [m] of every robot to its goal."""
+    """Give the true straight distance (N,) [m] of every robot to its goal."""
     offsets = state.goals - state.poses[:, :2]
     return np.hypot(offsets[:, 0], offsets[:, 1])
 

@@ -23,10 +23,12 @@ from ses_core.protocols import Policy
 from ses_core.robot_profile import RobotProfile
 
 DECISION_PERIOD_S = 1.0
-"""A policy sets the parameters once per second of driving (ros_jackal's `time_step`)."""
+"""Unless it was trained otherwise, a policy sets the parameters once per second of driving
+(`time_step` of ros_jackal and of APPLR)."""
 
-HIDDEN_SIZES = {"authors": (512, 512), "default": (256, 256)}
-"""Hidden layers by preset; the authors' are those of ros_jackal's `configs/laser.yaml`."""
+HIDDEN_SIZES = {"authors": (512, 512), "paper": (512, 512), "default": (256, 256)}
+"""Hidden layers by preset: ros_jackal's `configs/laser.yaml`, APPLR's `td3_condor.json` (which has
+convolutions before them), ours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,13 +59,19 @@ class ParameterPolicy:
         observation: Layout of what it sees.
         weights: One (out, in) float32 matrix per layer.
         biases: One (out,) float32 vector per layer.
+        decision_period: Driving between two decisions that it was trained for [s].
     """
 
     observation: ObservationSpec
     weights: tuple[Float32Array, ...]
     biases: tuple[Float32Array, ...]
+    decision_period: float = DECISION_PERIOD_S
 
     def __post_init__(self) -> None:
+        if not (np.isfinite(self.decision_period) and self.decision_period > 0.0):
+            raise ValueError(
+                f"policy decides every {self.decision_period} s, expected more than 0 s"
+            )
         width = self.observation.length
         for number, (matrix, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             if matrix.ndim != 2 or matrix.shape[1] != width or bias.shape != matrix.shape[:1]:
@@ -115,6 +123,20 @@ def observer_for(policy: Policy, profile: RobotProfile) -> Observer:
     """Give what a policy sees the world through on a robot; fixed parameters ignore it."""
     spec = policy.observation if isinstance(policy, ParameterPolicy) else DEFAULT_OBSERVATION
     return make_observer(spec, profile)
+
+
+def decision_ticks(period: float, time_step: float) -> int:
+    """Give the control ticks of a time step [s] between two decisions a period [s] apart."""
+    return max(1, round(period / time_step))
+
+
+def policy_ticks(policy: Policy, time_step: float) -> int:
+    """Give the control ticks between two decisions of a policy, as it was trained.
+
+    Fixed parameters are the same whenever they are set.
+    """
+    period = policy.decision_period if isinstance(policy, ParameterPolicy) else DECISION_PERIOD_S
+    return decision_ticks(period, time_step)
 
 
 def initial_parameters(count: int) -> FloatArray:

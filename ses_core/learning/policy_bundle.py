@@ -4,7 +4,7 @@
 | --- | --- |
 | `policy.safetensors` | `weight.0`, `bias.0`, ... float32, layer by layer |
 | `policy.onnx` | the same policy for the target robot's laser, readings in, parameters out |
-| `policy.json` | observation, action, network, lineage, digests |
+| `policy.json` | observation, action, reward, network, lineage, digests |
 | `card.md` | the same for people |
 
 No part of it is pickled, and no part has a date in it: equal policies are equal bundles.
@@ -13,7 +13,7 @@ No part of it is pickled, and no part has a date in it: equal policies are equal
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -25,17 +25,25 @@ from ses_core.arrays import Float32Array
 from ses_core.errors import ArtifactError
 from ses_core.learning.observation import ObservationSpec, make_observer
 from ses_core.learning.policies import DECISION_PERIOD_S, ParameterPolicy
-from ses_core.planning.parameters import (
-    PARAMETER_HIGH,
-    PARAMETER_LOW,
-    PARAMETER_NAMES,
-    PARAMETER_UNITS,
+from ses_core.learning.policy_record import (
+    action_record,
+    observation_record,
+    policy_card,
+    reward_record,
 )
-from ses_core.recipes import canonical_json, digest_bytes, digest_json, settings_json
+from ses_core.learning.reward import RewardSpec
+from ses_core.recipes import JsonValue, canonical_json, digest_bytes, digest_json, settings_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
+from ses_core.settings_model import SettingsModel
 
-SCHEMA_VERSION = 1
+_Spec = TypeVar("_Spec", bound=SettingsModel)
+
+SCHEMA_VERSION = 2
+"""Version 1 did not say what was rewarded."""
+
+_READABLE_VERSIONS = (1, SCHEMA_VERSION)
+
 WEIGHTS_FILE, ONNX_FILE, JSON_FILE, CARD_FILE = (
     "policy.safetensors",
     "policy.onnx",
@@ -73,6 +81,7 @@ class PolicyBundle:
     Attributes:
         policy_id: 16 hexadecimal digits of its weights and of what it sees and sets.
         robot: Name of the robot profile it was trained for.
+        reward: What its training rewarded; None in bundles that do not say.
         digests: Of simulator, planner and robot at training, by name.
     """
 
@@ -80,13 +89,21 @@ class PolicyBundle:
     policy: ParameterPolicy
     lineage: Lineage
     robot: str
+    reward: RewardSpec | None
     digests: Mapping[str, str]
 
 
 def policy_id(policy: ParameterPolicy) -> str:
-    """Identify a policy by what it computes: 16 hexadecimal digits."""
+    """Identify a policy by what it computes: 16 hexadecimal digits.
+
+    The usual decision period is left out, so that policies from before it was a setting keep
+    their names.
+    """
     weights = digest_bytes(save_tensors(_tensors(policy)))
-    return digest_json([weights, settings_json(policy.observation), _action_spec()])[:16]
+    named: list[JsonValue] = [weights, settings_json(policy.observation), action_record()]
+    if policy.decision_period != DECISION_PERIOD_S:
+        named.append(policy.decision_period)
+    return digest_json(named)[:16]
 
 
 def pack_bundle(
@@ -95,6 +112,7 @@ def pack_bundle(
     lineage: Lineage,
     profile: RobotProfile,
     simulation: SimulationSettings,
+    reward: RewardSpec,
 ) -> dict[str, bytes]:
     """Give the files of a bundle by name.
 
@@ -103,6 +121,7 @@ def pack_bundle(
         lineage: Where it comes from.
         profile: The robot it was trained for; its laser is the ONNX model's.
         simulation: The simulator it was trained in.
+        reward: What its training rewarded.
     """
     # onnx is needed where policies are packed, never where they are loaded.
     from ses_core.learning.onnx_export import export_onnx
@@ -113,9 +132,10 @@ def pack_bundle(
         "schema_version": SCHEMA_VERSION,
         "policy_id": policy_id(policy),
         "robot": profile.name,
-        "decision_period_s": DECISION_PERIOD_S,
-        "observation": _observation_record(policy.observation),
-        "action": _action_spec(),
+        "decision_period_s": policy.decision_period,
+        "observation": observation_record(policy.observation),
+        "action": action_record(),
+        "reward": reward_record(reward),
         "network": {
             "hidden_sizes": list(policy.hidden_sizes),
             "hidden_activation": "relu",
@@ -127,14 +147,14 @@ def pack_bundle(
             "onnx": digest_bytes(model),
             "simulation": digest_json(settings_json(simulation)),
             "robot_profile": digest_json(settings_json(profile)),
-            "action": digest_json(_action_spec()),
+            "action": digest_json(action_record()),
         },
     }
     return {
         WEIGHTS_FILE: weights,
         ONNX_FILE: model,
         JSON_FILE: (json.dumps(record, indent=2, sort_keys=True, allow_nan=False) + "\n").encode(),
-        CARD_FILE: _card(record).encode(),
+        CARD_FILE: policy_card(record).encode(),
     }
 
 
@@ -154,22 +174,22 @@ def unpack_bundle(files: Mapping[str, bytes], *, source: str) -> PolicyBundle:
     try:
         record = json.loads(files[JSON_FILE])
         version = record["schema_version"]
-        if version != SCHEMA_VERSION:
+        if version not in _READABLE_VERSIONS:
             raise ArtifactError(
-                f"policy {source} has schema version {version}, expected {SCHEMA_VERSION}"
+                f"policy {source} has schema version {version}, expected at most {SCHEMA_VERSION}"
             )
         _check_digests(files, record["digests"], source=source)
-        if canonical_json(record["action"]) != canonical_json(_action_spec()):
+        if canonical_json(record["action"]) != canonical_json(action_record()):
             raise ArtifactError(
                 f"policy {source} sets other parameters or bounds than this planner has"
             )
-        layout = {name: record["observation"][name] for name in ObservationSpec.model_fields}
-        policy = _policy(ObservationSpec(**layout), load_tensors(files[WEIGHTS_FILE]))
+        policy = _policy(record, load_tensors(files[WEIGHTS_FILE]))
         bundle = PolicyBundle(
             policy_id=policy_id(policy),
             policy=policy,
             lineage=Lineage(**record["lineage"]),
             robot=record["robot"],
+            reward=None if version == 1 else _part(RewardSpec, record["reward"]),
             digests=dict(record["digests"]),
         )
     except (KeyError, TypeError, ValueError, ValidationError, SafetensorError) as error:
@@ -199,103 +219,16 @@ def _tensors(policy: ParameterPolicy) -> dict[str, Float32Array]:
     return tensors
 
 
-def _policy(spec: ObservationSpec, tensors: Mapping[str, Float32Array]) -> ParameterPolicy:
+def _policy(record: Mapping[str, Any], tensors: Mapping[str, Float32Array]) -> ParameterPolicy:
     layers = range(len(tensors) // 2)
     return ParameterPolicy(
-        observation=spec,
+        observation=_part(ObservationSpec, record["observation"]),
         weights=tuple(tensors[f"weight.{number}"] for number in layers),
         biases=tuple(tensors[f"bias.{number}"] for number in layers),
+        decision_period=record["decision_period_s"],
     )
 
 
-def _observation_record(spec: ObservationSpec) -> dict[str, Any]:
-    """Give the layout with units, ranges and the formula of every part."""
-    clip, goal = spec.laser_clip_m, spec.goal_clip_m
-    parts: list[dict[str, Any]] = [
-        {
-            "name": "scan",
-            "length": spec.sectors,
-            "unit": "m",
-            "range": [0.0, clip],
-            "normalisation": f"(nearest reading of the sector - {clip / 2:g}) / {clip:g}",
-        },
-        {
-            "name": "goal_angle",
-            "length": 1,
-            "unit": "rad",
-            "range": [-float(np.pi), float(np.pi)],
-            "normalisation": "angle / (2 pi)",
-        },
-    ]
-    if goal is not None:
-        parts.append(
-            {
-                "name": "goal_distance",
-                "length": 1,
-                "unit": "m",
-                "range": [0.0, goal],
-                "normalisation": f"min(distance, {goal:g}) / {goal:g} - 0.5",
-            }
-        )
-    if spec.has_parameters:
-        parts.append(
-            {
-                "name": "parameters",
-                "length": len(PARAMETER_NAMES),
-                "unit": "own",
-                "range": "those of the action",
-                "normalisation": "2 (parameter - low) / (high - low) - 1",
-            }
-        )
-    return {**settings_json(spec), "length": spec.length, "parts": parts}
-
-
-def _action_spec() -> dict[str, Any]:
-    return {
-        "normalisation": "parameter = low + (action + 1) / 2 (high - low), action in [-1, 1]",
-        "parameters": [
-            {"name": name, "unit": unit, "low": float(low), "high": float(high)}
-            for name, unit, low, high in zip(
-                PARAMETER_NAMES, PARAMETER_UNITS, PARAMETER_LOW, PARAMETER_HIGH, strict=True
-            )
-        ],
-    }
-
-
-def _card(record: Mapping[str, Any]) -> str:
-    lineage, digests = record["lineage"], record["digests"]
-    rows = "\n".join(
-        f"| `{row['name']}` | {row['low']:g} | {row['high']:g} | {row['unit']} |"
-        for row in record["action"]["parameters"]
-    )
-    parts = "\n".join(
-        f"| {part['name']} | {part['length']} | {part['unit']} | `{part['normalisation']}` |"
-        for part in record["observation"]["parts"]
-    )
-    return f"""# Policy {record["policy_id"]}
-
-Sets the parameters of a dynamic-window planner once per {record["decision_period_s"]:g} s on a
-{record["robot"]} (APPLR). It never commands a velocity itself.
-
-- Trained in: {lineage["trained_in"]} ({lineage["environments"]} tasks)
-- Algorithm: {lineage["algorithm"]}, {lineage["steps"]} decisions, seed {lineage["seed"]}
-- Parent: {lineage["parent_id"] or "none, from random weights"}
-- Run: {lineage["run_id"] or "none"}
-
-## What it sees
-| part | length | unit | normalisation |
-| --- | --- | --- | --- |
-{parts}
-
-## What it sets
-| parameter | least | most | unit |
-| --- | --- | --- | --- |
-{rows}
-
-## Limits
-Trained in simulation, among static obstacles, for one robot and its laser. It has been measured
-only where an evaluation says so.
-
-## Digests
-{chr(10).join(f"- {name}: `{value}`" for name, value in sorted(digests.items()))}
-"""
+def _part(kind: type[_Spec], record: Mapping[str, Any]) -> _Spec:
+    """Read a specification from its record, which explains it with keys of its own."""
+    return kind(**{name: record[name] for name in kind.model_fields})

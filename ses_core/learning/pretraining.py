@@ -22,13 +22,28 @@ HELD_OUT_EVERY = 6
 WORLD_SEED = 20_211_001
 """Seed of those worlds."""
 
-PRETRAINING = TrainingSettings(steps=100_000, parallel_envs=50)
-"""Settings of the shipped original policy."""
+STEPS, PARALLEL_ENVS = 100_000, 50
+"""How long, and in how many worlds at once, the shipped original policy was trained."""
 
 PRETRAINING_SIMULATION = SimulationSettings(sensing_rate_hz=2.5)
 """The simulator it was trained in: scans and grids at half the usual rate, for twice the speed.
 
 The policy decides once per second; grids at 1 to 20 Hz were measured to give equal results."""
+
+
+def pretraining(
+    training: TrainingSettings, *, steps: int | None, seed: int | None
+) -> TrainingSettings:
+    """Give a pretraining its settings: of the length of the shipped policy's, unless asked.
+
+    Algorithm, reward, what is seen and how often is decided are the settings' own.
+    """
+    changes = {
+        "steps": STEPS if steps is None else steps,
+        "parallel_envs": PARALLEL_ENVS,
+        "seed": training.seed if seed is None else seed,
+    }
+    return training.model_copy(update=changes)
 
 
 def world_numbers(part: Part) -> list[int]:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -10,7 +10,7 @@ import torch
 from ses_core.arrays import FloatArray
 from ses_core.learning.algorithms import extract_policy, make_learner
 from ses_core.learning.decision_process import DecisionProcess
-from ses_core.learning.observation import OBSERVATIONS
+from ses_core.learning.observation import observation_for
 from ses_core.learning.policies import HIDDEN_SIZES, ParameterPolicy, random_policy
 from ses_core.learning.training_curve import CurvePoint
 from ses_core.learning.training_monitor import StopReason, TrainingMonitor
@@ -55,9 +55,10 @@ def train(
 ) -> TrainingResult:
     """Train a policy in tasks (section IV-A, APPLR).
 
-    A parent's actor is gone on with, under its own observation and sizes. Its critic is not
-    kept: for the first `critic_share` of the decisions the new critic learns alone, so that
-    what it does not know yet cannot spoil the actor.
+    A parent's actor is gone on with, under its own observation and sizes, and every so often as
+    it was trained to decide unless the settings say otherwise. Its critic is not kept: for the
+    first `critic_share` of the decisions the new critic learns alone, so that what it does not
+    know yet cannot spoil the actor.
 
     Equal arguments give equal weights on one machine.
 
@@ -69,7 +70,7 @@ def train(
         profile: The robot.
         weights: How often each task is drawn; equally often without.
         progress: Hears the share that is done, from 0 to 1.
-        deadline: Asked after every second of driving; the training ends when it says yes.
+        deadline: Asked after every decision; the training ends when it says yes.
 
     Raises:
         ValueError: There is no task.
@@ -77,10 +78,11 @@ def train(
     started = time.perf_counter()
     streams = np.random.SeedSequence(settings.seed).spawn(2)
     start = parent or random_policy(
-        OBSERVATIONS[settings.preset],
+        observation_for(settings.preset, profile),
         HIDDEN_SIZES[settings.preset],
         rng=np.random.default_rng(streams[0]),
     )
+    start = replace(start, decision_period=settings.decision_period_s or start.decision_period)
     slots = min(settings.parallel_envs, max(1, settings.steps // _LEAST_ROUNDS))
     simulator = make_simulator(
         settings.simulator, slots=slots, profile=profile, settings=simulation
@@ -95,6 +97,7 @@ def train(
             observation=start.observation,
             profile=profile,
             settings=settings,
+            decision_period=start.decision_period,
             weights=weights,
         )
         env = VectorNavigationEnv(process, rng=np.random.default_rng(streams[1]))
@@ -102,14 +105,14 @@ def train(
             env, start, settings=settings, is_fine_tuning=parent is not None
         )
         monitor = TrainingMonitor(
-            observation=start.observation,
+            start=start,
             decisions=decisions,
             frozen_decisions=round(settings.critic_share * decisions) if parent else 0,
             progress=progress,
             deadline=deadline,
         )
         learner.learn(decisions, callback=monitor)
-        final = extract_policy(learner, start.observation)
+        final = extract_policy(learner, start)
     finally:
         torch.set_num_threads(threads)
         simulator.close()

@@ -7,7 +7,6 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from ses_core.learning.algorithms import actor_parameters, extract_policy
-from ses_core.learning.observation import ObservationSpec
 from ses_core.learning.policies import ParameterPolicy
 from ses_core.learning.training_curve import CurvePoint
 
@@ -32,7 +31,7 @@ class TrainingMonitor(BaseCallback):
     def __init__(
         self,
         *,
-        observation: ObservationSpec,
+        start: ParameterPolicy,
         decisions: int,
         frozen_decisions: int,
         progress: Callable[[float], None],
@@ -42,7 +41,7 @@ class TrainingMonitor(BaseCallback):
         self.curve: list[CurvePoint] = []
         self.reason: StopReason = "finished"
         self.best: ParameterPolicy | None = None
-        self._observation = observation
+        self._start = start
         self._decisions = decisions
         self._frozen_decisions = frozen_decisions
         self._progress = progress
@@ -92,7 +91,7 @@ class TrainingMonitor(BaseCallback):
 
     def _watch(self, point: CurvePoint) -> None:
         """Keep the best policy so far, and stop where the present one has fallen far behind."""
-        policy = extract_policy(self.model, self._observation)
+        policy = extract_policy(self.model, self._start)
         if not all(np.isfinite(array).all() for array in (*policy.weights, *policy.biases)):
             self.reason = "diverged"
             return

@@ -52,7 +52,7 @@ class VectorNavigationEnv(VecEnv):
         self._actions = np.asarray(actions, dtype=np.float64)
 
     def step_wait(self) -> tuple[Float32Array, Float32Array, BoolArray, list[dict[str, Any]]]:
-        """Drive every robot for a second and start finished ones over."""
+        """Drive every robot until the next decision and start finished ones over."""
         decision = self._process.decide(self._actions)
         self._returns += decision.rewards
         self._lengths += 1

@@ -13,7 +13,7 @@ def environment_figure(
 
     Args:
         environment: The place.
-        target: The robot whose shortest way is drawn.
+        target: The robot whose shortest way is drawn, with its body half-way.
         theme: Colours.
     """
     figure = new_figure(5.2, 5.4, theme=theme)

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Polygon, Rectangle
 
 from ses_core.arrays import FloatArray
 from ses_core.extraction.extract import ExtractedScenario, PlaceQuality
@@ -48,7 +48,7 @@ def scenario_figure(
     Args:
         extracted: The scenario with its place.
         trajectory: The drive it was cut from.
-        target: The robot whose shortest way is drawn.
+        target: The robot whose shortest way is drawn, with its body half-way.
         scan_margin: Scans this long [s] before and after the scenario are shown.
         theme: Colours.
     """
@@ -99,7 +99,7 @@ def draw_environment(
         axes: Where to draw.
         environment: The place, or None where it could not be rebuilt.
         path: The way driven (P, 2) [m], upright.
-        target: The robot whose shortest way is drawn too.
+        target: The robot whose shortest way is drawn too, with its body half-way.
         theme: Colours.
     """
     half = ENVIRONMENT_SIDE_M / 2
@@ -130,6 +130,7 @@ def draw_environment(
             label = f"shortest ({target.name})"
             line = upright(shortest)
             axes.plot(*line.T, color=theme.series[1], linewidth=1.4, ls="--", label=label)
+            axes.add_patch(_body_on_the_way(target, line, theme))
         axes.legend(
             loc="upper center",
             bbox_to_anchor=(0.5, -0.03),
@@ -139,6 +140,19 @@ def draw_environment(
             labelcolor=theme.ink,
         )
     _mark_ends(axes, theme)
+
+
+def _body_on_the_way(target: RobotProfile, line: FloatArray, theme: Theme) -> Polygon:
+    """Give a robot's bare body half-way along a line (N, 2) [m], turned along it."""
+    pieces = np.diff(line, axis=0)
+    lengths = np.hypot(pieces[:, 0], pieces[:, 1])
+    made = np.cumsum(lengths)
+    number = int(np.searchsorted(made, made[-1] / 2))
+    ahead = pieces[number] / lengths[number]
+    middle = line[number + 1] - (made[number] - made[-1] / 2) * ahead
+    turn = np.array([ahead, (-ahead[1], ahead[0])])
+    corners = middle + np.array(target.body()) @ turn
+    return Polygon(corners, fc=(*to_rgb(theme.series[1]), 0.25), ec=theme.series[1], lw=1.2)
 
 
 def _draw_drive(

@@ -14,7 +14,7 @@ from ses_core.arrays import Float32Array, FloatArray, IntArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.geometry import wrap_angles
 from ses_core.imperfections import resolve
-from ses_core.learning.policies import DECISION_PERIOD_S, initial_parameters, observer_for
+from ses_core.learning.policies import initial_parameters, observer_for, policy_ticks
 from ses_core.navigation import NavigationTask
 from ses_core.protocols import Policy, Simulator
 from ses_core.robot_profile import RobotProfile
@@ -87,7 +87,7 @@ def _drive_all(
     progress: Callable[[float], None],
 ) -> Iterator[Deployment]:
     observer = observer_for(policy, profile)
-    ticks = max(1, round(DECISION_PERIOD_S / simulator.time_step))
+    ticks = policy_ticks(policy, simulator.time_step)
     recorder = _Recorder(simulator, simulation, beams=profile.laser.beams)
     parameters = initial_parameters(simulator.slots)
     waiting = deque(range(len(tasks)))

@@ -202,6 +202,28 @@ def _kill_when(command: Sequence[str], root: Path, *, logs: int) -> None:
         night.wait()
 
 
+def test_a_night_for_another_robot_trains_measures_and_shows_that_one(
+    fleet: Fleet, first: dict[str, Any], tmp_path: Path
+) -> None:
+    other = Fleet(fleet.inbox, tmp_path / "ses.toml", tmp_path / "store")
+    short = SETTINGS.replace("steps = 400", "steps = 64")
+    other.settings.write_text(f'target_robot = "turtlebot4"\n{short}', encoding="utf-8")
+    night = other.night()
+    assert night["run_id"] != first["run_id"]
+    (folder,) = (path.parent for path in (other.root / "objects/train").glob("*/policy.json"))
+    assert read_policy(folder).robot == "turtlebot4"
+    page = Path(night["report"]).read_text(encoding="utf-8")
+    assert "<strong>turtlebot4</strong>" in page
+    assert 'alt="footprint of turtlebot4"' in page
+    # One that can only drive at 0.46 m/s was measured: fast parameters make no Jackal of it.
+    speeds = {
+        root: (episodes.path_length_m / episodes.time_s).max()
+        for root in (fleet.root, other.root)
+        for episodes in [pd.read_parquet(root / "tables/episodes")]
+    }
+    assert speeds[other.root] < 0.5 < speeds[fleet.root]
+
+
 def test_one_more_log_is_the_only_one_decoded_and_extracted(
     fleet: Fleet, first: dict[str, Any], tmp_path: Path
 ) -> None:

@@ -7,6 +7,7 @@ from ses_core.evaluation.episodes import Episode
 from ses_core.evaluation.statistics import PolicySummary
 from ses_core.extraction.funnel import FunnelStep
 from ses_core.learning.training_curve import CurvePoint
+from ses_core.robot_profile import JACKAL
 from storage.night_report import (
     Decision,
     EvaluationUse,
@@ -30,6 +31,7 @@ def full_night() -> NightReport:
     return NightReport(
         run_id="20261122-1f2e3d",
         batch_date="2026-11-22",
+        robot=JACKAL,
         decision=Decision(
             verdict="insufficient evidence",
             reasons=("12 held-out worlds, at least 100 are needed.",),
@@ -108,6 +110,7 @@ def untrained_night() -> NightReport:
     return NightReport(
         run_id="20261123-aa",
         batch_date="2026-11-23",
+        robot=JACKAL,
         decision=Decision(
             verdict="no training",
             reasons=("No scenario has more than 50 steps with v < 0.",),
@@ -125,6 +128,7 @@ def quiet_night() -> NightReport:
     return NightReport(
         run_id="20261124-bb",
         batch_date="2026-11-24",
+        robot=JACKAL,
         decision=Decision(verdict="nothing new", reasons=("The inbox holds no new log.",)),
     )
 

@@ -9,6 +9,7 @@ from ses_core.errors import ArtifactError
 from ses_core.learning.observation import DEFAULT_OBSERVATION
 from ses_core.learning.policies import FIXED_POLICIES, ParameterPolicy, random_policy
 from ses_core.learning.policy_bundle import BUNDLE_FILES, Lineage, policy_id
+from ses_core.learning.reward import DEFAULT_REWARD
 from ses_core.learning.training_curve import CurvePoint
 from ses_core.recipes import ArtifactRef, Recipe
 from ses_core.robot_profile import JACKAL
@@ -47,6 +48,7 @@ def write_some(directory: Path, seed: int, *, run: str = "") -> None:
         lineage=lineage,
         profile=JACKAL,
         simulation=SimulationSettings(),
+        reward=DEFAULT_REWARD,
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from ses_core.robot_profile import JACKAL, TURTLEBOT4
 from storage.night_report import NightReport
 from storage.report_page import GALLERY_LIMIT, render_page, write_report
 from tests.storage.nights import environments, full_night, quiet_night, untrained_night
@@ -93,8 +94,8 @@ def test_hostile_identities_cannot_leave_their_attribute() -> None:
 
 def test_every_picture_is_a_whole_png(full_page: Page) -> None:
     images = full_page.images()
-    # Two galleries and five figures.
-    assert len(images) == 120 + 100 + 5
+    # Two galleries and six figures.
+    assert len(images) == 120 + 100 + 6
     for content in images:
         with Image.open(io.BytesIO(content)) as image:
             image.load()
@@ -103,7 +104,7 @@ def test_every_picture_is_a_whole_png(full_page: Page) -> None:
 
 def test_every_figure_has_a_twin_for_dark_pages(full_page: Page) -> None:
     sources = [attributes for tag, attributes in full_page.tags if tag == "source"]
-    assert len(sources) == 5
+    assert len(sources) == 6
     assert {item["media"] for item in sources} == {"(prefers-color-scheme: dark)"}
 
 
@@ -158,6 +159,23 @@ def test_a_night_without_training_shows_its_funnel_and_no_empty_sections() -> No
         "Where robots struggled",
     ):
         assert heading not in text
+
+
+def test_the_page_says_which_robot_it_is_for_and_shows_its_footprint() -> None:
+    jackal, turtlebot = (
+        render_page(replace(full_night(), robot=robot)) for robot in (JACKAL, TURTLEBOT4)
+    )
+    assert "0.42 m long and 0.33 m wide, laser of 720 beams over 270°" in Page(jackal).text
+    assert "For the robot turtlebot4 : round, 0.38 m across" in plain(Page(turtlebot))
+    assert "laser of 720 beams over 360°" in Page(turtlebot).text
+    assert "For the robot jackal" in plain(Page(jackal))
+    shown = [
+        {attributes["src"] for tag, attributes in Page(html).tags if tag == "img"}
+        for html in (jackal, turtlebot)
+    ]
+    assert len(shown[0] ^ shown[1]) == 2
+    named = replace(quiet_night(), robot=JACKAL.model_copy(update={"name": "<b>x</b>"}))
+    assert "<b>x" not in render_page(named)
 
 
 def test_a_night_without_logs_is_a_short_page() -> None:

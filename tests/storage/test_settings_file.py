@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 
 from ses_core.errors import SettingsError
+from ses_core.robot_profile import TURTLEBOT4
 from ses_core.settings import PcaSettings, Settings
 from storage.settings_file import parse_settings, read_settings
 
@@ -41,9 +42,34 @@ def test_what_a_file_leaves_out_has_its_default(tmp_path: Path) -> None:
     assert read_settings(path) == Settings()
 
 
+def test_the_target_robot_is_a_profile_or_the_name_of_one(tmp_path: Path) -> None:
+    path = tmp_path / "ses.toml"
+    path.write_text('target_robot = "turtlebot4"')
+    assert read_settings(path).target_robot == TURTLEBOT4
+    path.write_text(
+        """
+        target_robot = "cleaner"
+        [ingest.profiles.cleaner]
+        name = "cleaner"
+        footprint_m = []
+        radius_m = 0.25
+        """
+    )
+    assert read_settings(path).target_robot.radius_m == 0.25
+    path.write_text("[target_robot]\nname = 'odd'\nmax_speed_mps = 1.0")
+    assert read_settings(path).target_robot.max_speed_mps == 1.0
+    settings = parse_settings({"target_robot": "neato"}, source="test")
+    assert Settings.model_validate(settings.model_dump(mode="json")) == settings
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        (
+            'target_robot = "robot9"',
+            "setting 'target_robot': no robot profile has that name, expected jackal, turtlebot4, "
+            "neato, raspimouse, generic (found 'robot9')",
+        ),
         ("filter.treshold = 3", "unknown setting 'filter.treshold', expected 'threshold'"),
         ("filters.threshold = 3", "unknown setting 'filters', expected 'filter'"),
         (

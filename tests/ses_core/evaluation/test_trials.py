@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ses_core.arrays import FloatArray
 from ses_core.evaluation.trials import EvaluationTask, evaluate, evaluation_task
 from ses_core.learning.observation import DEFAULT_OBSERVATION
-from ses_core.learning.policies import FIXED_POLICIES, random_policy
+from ses_core.learning.policies import FIXED_POLICIES, ParameterPolicy, random_policy
 from ses_core.protocols import Policy
 from ses_core.robot_profile import JACKAL
 from ses_core.settings import SimulationSettings
@@ -99,6 +100,30 @@ def test_each_trial_has_a_seed_of_its_own_shared_by_all_policies() -> None:
     assert len({episode.seed for episode in slow}) == 3
     assert [episode.seed for episode in slow] == [episode.seed for episode in fast]
     assert len({episode.path_length_m for episode in slow}) == 3
+
+
+def test_a_policy_decides_as_often_as_it_was_trained_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    flat = random_policy(DEFAULT_OBSERVATION, (8,), rng=np.random.default_rng(0))
+    flat = replace(flat, weights=tuple(0 * matrix for matrix in flat.weights))
+    counts: dict[float, int] = {0.5: 0, 1.0: 0}
+    act = ParameterPolicy.act
+
+    def counted(policy: ParameterPolicy, observations: FloatArray) -> FloatArray:
+        counts[policy.decision_period] += 1
+        return act(policy, observations)
+
+    monkeypatch.setattr(ParameterPolicy, "act", counted)
+    often, seldom = evaluate(
+        {"often": replace(flat, decision_period=0.5), "seldom": flat},
+        places()[:1],
+        trials=1,
+        seed=0,
+        simulation=SIMULATION,
+        profile=JACKAL,
+    )
+    # One that always decides the same drives the same, however often it does.
+    assert often.time_s == seldom.time_s
+    assert counts == {0.5: np.ceil(often.time_s / 0.5), 1.0: np.ceil(seldom.time_s)}
 
 
 def test_two_places_with_one_name_are_refused() -> None:

@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from stable_baselines3 import TD3
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from ses_core.arrays import Float32Array
@@ -71,7 +72,7 @@ def test_a_learner_starts_as_the_policy_it_goes_on_from(algorithm: Algorithm) ->
     seen = np.random.default_rng(1).uniform(-0.5, 0.5, (30, 129)).astype(np.float32)
     predicted, _ = learner.predict(seen, deterministic=True)
     np.testing.assert_allclose(predicted, start.actions(seen.astype(np.float64)), atol=1e-5)
-    copied = extract_policy(learner, start.observation)
+    copied = extract_policy(learner, start)
     for matrix, copy in zip(start.weights, copied.weights, strict=True):
         np.testing.assert_array_equal(matrix, copy)
 
@@ -103,7 +104,7 @@ def test_a_frozen_actor_stays_while_its_critic_learns(algorithm: Algorithm) -> N
     others = [one for one in learner.policy.parameters() if id(one) not in frozen]
     before = [one.detach().clone() for one in others]
     learner.learn(decisions)
-    kept = extract_policy(learner, start.observation)
+    kept = extract_policy(learner, start)
     for old, new in zip(start.weights, kept.weights, strict=True):
         np.testing.assert_array_equal(old, new)
     assert any(not torch.equal(old, new) for old, new in zip(before, others, strict=True))
@@ -119,12 +120,19 @@ def test_whole_rollouts_come_close_to_the_decisions_asked_for(
     assert 0.9 * steps <= decisions <= steps
 
 
-def test_the_authors_preset_has_their_constants() -> None:
-    settings = TrainingSettings(algorithm="td3", preset="authors", gamma=0.95, steps=1000)
-    learner, _ = make_learner(still_env(4), some_policy(), settings=settings, is_fine_tuning=False)
-    assert learner.lr_schedule(1.0) == 1e-5
-    assert learner.gradient_steps == 4  # type: ignore[attr-defined]  # of TD3: one per decision
-    assert learner.n_steps == 4  # type: ignore[attr-defined]  # of TD3: returns over 4 decisions
+@pytest.mark.parametrize(
+    ("preset", "rate", "updates", "steps_of_return"),
+    [("default", 1e-4, 5, 1), ("authors", 1e-5, 20, 4), ("paper", 2e-4, 2, 4)],
+)
+def test_presets_have_their_constants(
+    preset: Literal["default", "authors", "paper"], rate: float, updates: int, steps_of_return: int
+) -> None:
+    settings = TrainingSettings(algorithm="td3", preset=preset, gamma=0.95, steps=1000)
+    learner, _ = make_learner(still_env(20), some_policy(), settings=settings, is_fine_tuning=False)
+    assert isinstance(learner, TD3)
+    assert learner.lr_schedule(1.0) == rate
+    assert learner.gradient_steps == updates
+    assert learner.n_steps == steps_of_return
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
@@ -136,5 +144,5 @@ def test_a_learner_learns_what_is_rewarded(algorithm: Algorithm) -> None:
     learner.learn(decisions)
     seen = np.full((1, DEFAULT_OBSERVATION.length), 0.25)
     assert abs(start.actions(seen)[0, 0]) < 0.2
-    learned = extract_policy(learner, start.observation).actions(seen)[0, 0]
+    learned = extract_policy(learner, start).actions(seen)[0, 0]
     assert learned > 0.4

@@ -10,13 +10,23 @@ from hypothesis import strategies as st
 from ses_core.learning.observation import (
     AUTHORS_OBSERVATION,
     DEFAULT_OBSERVATION,
+    OBSERVATIONS,
+    PAPER_OBSERVATION,
     ObservationSpec,
     goal_distances,
     make_observer,
+    observation_for,
 )
 from ses_core.learning.policies import initial_parameters
 from ses_core.planning.parameters import PARAMETER_HIGH, PARAMETER_LOW
-from ses_core.robot_profile import JACKAL, NEATO, TURTLEBOT4, LaserProfile, RobotProfile
+from ses_core.robot_profile import (
+    JACKAL,
+    NEATO,
+    RASPIMOUSE,
+    TURTLEBOT4,
+    LaserProfile,
+    RobotProfile,
+)
 from tests.ses_core.learning.snapshots import looking_at
 
 AHEAD = looking_at((5.0, 0.0), (1.0, 0.0))
@@ -34,6 +44,40 @@ def turned(laser_yaw: float) -> RobotProfile:
 def test_presets_have_the_lengths_they_are_documented_with() -> None:
     assert AUTHORS_OBSERVATION.length == 721
     assert DEFAULT_OBSERVATION.length == 129
+    assert PAPER_OBSERVATION.length == 728
+
+
+@pytest.mark.parametrize(
+    ("profile", "right", "left"),
+    [
+        (JACKAL, -2.35619, 2.35619),
+        (TURTLEBOT4, -math.pi, math.pi),
+        (NEATO, -math.pi, math.pi),
+        (RASPIMOUSE, -2.36, 2.09),
+        (turned(math.pi), -math.pi, math.pi),
+    ],
+    ids=["jackal", "turtlebot4", "neato", "raspimouse", "turned"],
+)
+@pytest.mark.parametrize("preset", ["default", "authors", "paper"])
+def test_sectors_span_what_the_laser_sees(
+    preset: str, profile: RobotProfile, right: float, left: float
+) -> None:
+    spec = observation_for(preset, profile)
+    assert (spec.sector_min_rad, spec.sector_max_rad) == (right, left)
+    assert spec.name == preset
+    assert spec.length == OBSERVATIONS[preset].length
+    if profile is JACKAL:
+        assert spec == OBSERVATIONS[preset]
+    scan = np.full((1, profile.laser.beams), 0.5, dtype=np.float32)
+    assert (make_observer(spec, profile).pool(scan) == 0.5).all()
+
+
+def test_a_laser_all_round_sees_what_is_behind_the_robot() -> None:
+    behind = np.full((1, 720), 9.0, dtype=np.float32)
+    behind[0, 0] = 0.7
+    pooled = make_observer(observation_for("default", TURTLEBOT4), TURTLEBOT4).pool(behind)[0]
+    assert pooled.min() == np.float32(0.7)
+    assert (make_observer(DEFAULT_OBSERVATION, TURTLEBOT4).pool(behind) == 4.0).all()
 
 
 def test_authors_observation_is_that_of_ros_jackal() -> None:
@@ -121,7 +165,7 @@ def test_the_goal_and_the_parameters_follow_the_scan() -> None:
 
 
 @given(
-    st.sampled_from([AUTHORS_OBSERVATION, DEFAULT_OBSERVATION]),
+    st.sampled_from([AUTHORS_OBSERVATION, DEFAULT_OBSERVATION, PAPER_OBSERVATION]),
     st.floats(-50, 50),
     st.floats(-50, 50),
     st.integers(0, 1000),

@@ -1,6 +1,7 @@
 """Tests of policy bundles as bytes."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from ses_core.learning.policy_bundle import (
     policy_id,
     unpack_bundle,
 )
+from ses_core.learning.reward import AUTHORS_REWARD
 from ses_core.robot_profile import JACKAL
 from ses_core.settings import SimulationSettings
 
@@ -29,15 +31,20 @@ LINEAGE = Lineage(
     environments=12,
     trained_in="drawn places",
 )
+REWARD = AUTHORS_REWARD.model_copy(update={"failure_penalty": 3.0})
 
 
 def some_policy(seed: int = 0) -> ParameterPolicy:
     return random_policy(DEFAULT_OBSERVATION, (16, 8), rng=np.random.default_rng(seed))
 
 
-def packed(seed: int = 0) -> dict[str, bytes]:
+def packed(seed: int = 0, policy: ParameterPolicy | None = None) -> dict[str, bytes]:
     return pack_bundle(
-        some_policy(seed), lineage=LINEAGE, profile=JACKAL, simulation=SimulationSettings()
+        policy or some_policy(seed),
+        lineage=LINEAGE,
+        profile=JACKAL,
+        simulation=SimulationSettings(),
+        reward=REWARD,
     )
 
 
@@ -48,6 +55,29 @@ def test_a_bundle_read_back_is_the_policy_that_was_packed() -> None:
     assert bundle.lineage == LINEAGE
     assert bundle.policy_id == policy_id(some_policy())
     assert bundle.robot == "jackal"
+    assert bundle.reward == REWARD
+
+
+def test_the_decision_period_travels_with_the_policy_and_is_part_of_its_name() -> None:
+    policy = replace(some_policy(), decision_period=0.5)
+    bundle = unpack_bundle(packed(policy=policy), source="test")
+    assert bundle.policy.decision_period == 0.5
+    assert bundle.policy_id == policy_id(policy) != policy_id(some_policy())
+    assert "once per 0.5 s" in packed(policy=policy)["card.md"].decode()
+    with pytest.raises(ArtifactError, match="is named"):
+        unpack_bundle(changed_record(decision_period_s=0.5), source="test")
+    with pytest.raises(ArtifactError, match="expected more than 0 s"):
+        unpack_bundle(changed_record(decision_period_s=0.0), source="test")
+
+
+def test_a_bundle_from_before_rewards_were_kept_is_read() -> None:
+    files = changed_record(schema_version=1)
+    record = json.loads(files[JSON_FILE])
+    del record["reward"]
+    bundle = unpack_bundle({**files, JSON_FILE: json.dumps(record).encode()}, source="test")
+    assert bundle.reward is None
+    assert bundle.policy_id == policy_id(some_policy())
+    assert bundle.policy.decision_period == 1.0
 
 
 def test_equal_policies_are_equal_bundles_and_others_are_not() -> None:
@@ -97,8 +127,8 @@ def changed_record(**changes: object) -> dict[str, bytes]:
 
 
 def test_a_newer_bundle_is_refused() -> None:
-    with pytest.raises(ArtifactError, match="schema version 2, expected 1"):
-        unpack_bundle(changed_record(schema_version=2), source="test")
+    with pytest.raises(ArtifactError, match="schema version 3, expected at most 2"):
+        unpack_bundle(changed_record(schema_version=3), source="test")
 
 
 def test_a_bundle_for_other_bounds_is_refused() -> None:
@@ -128,4 +158,5 @@ def test_the_card_says_where_the_policy_comes_from() -> None:
     card = packed()["card.md"].decode()
     assert "drawn places (12 tasks)" in card
     assert "ppo, 1000 decisions, seed 3" in card
+    assert "Rewarded by: the preset `authors`" in card
     assert "| `inflation_radius` | 0.1 | 0.6 | m |" in card

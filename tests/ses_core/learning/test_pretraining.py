@@ -2,10 +2,12 @@
 
 from ses_core.learning.pretraining import (
     WORLD_SEED,
+    pretraining,
     training_tasks,
     world_numbers,
 )
 from ses_core.robot_profile import JACKAL
+from ses_core.settings import TrainingSettings
 from ses_core.worlds.cellular_automata import generate_barn_world
 from tests.ses_core.learning.places import corridor
 
@@ -15,6 +17,20 @@ def test_250_worlds_are_trained_in_and_50_others_tested_in() -> None:
     assert (len(training), len(testing)) == (250, 50)
     assert sorted([*training, *testing]) == list(range(300))
     assert testing[:3] == [0, 6, 12]
+
+
+def test_by_default_it_is_the_shipped_policys_training() -> None:
+    assert pretraining(TrainingSettings(), steps=None, seed=None) == TrainingSettings(
+        steps=100_000, parallel_envs=50
+    )
+
+
+def test_settings_choose_all_but_its_length() -> None:
+    settings = TrainingSettings(preset="paper", decision_period_s=0.5, steps=7, seed=3)
+    chosen = pretraining(settings, steps=None, seed=None)
+    assert chosen == settings.model_copy(update={"steps": 100_000, "parallel_envs": 50})
+    asked = pretraining(settings, steps=9, seed=0)
+    assert (asked.steps, asked.seed) == (9, 0)
 
 
 def test_a_world_with_a_course_gives_that_course_and_another_gives_pairs() -> None:

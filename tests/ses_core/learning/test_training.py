@@ -1,12 +1,17 @@
 """Tests of training in the real simulator."""
 
 import itertools
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import pytest
 
-from ses_core.learning.observation import AUTHORS_OBSERVATION, DEFAULT_OBSERVATION
+from ses_core.learning.observation import (
+    AUTHORS_OBSERVATION,
+    DEFAULT_OBSERVATION,
+    PAPER_OBSERVATION,
+)
 from ses_core.learning.policies import ParameterPolicy, random_policy
 from ses_core.learning.training import TrainingResult, train
 from ses_core.robot_profile import JACKAL
@@ -82,8 +87,29 @@ def test_a_passed_deadline_leaves_the_parent_as_it_is() -> None:
 def test_presets_decide_what_a_policy_without_a_parent_is() -> None:
     ours = run(SHORT.model_copy(update={"steps": 16}), None).policy
     theirs = run(SHORT.model_copy(update={"steps": 16, "preset": "authors"}), None).policy
+    papers = run(SHORT.model_copy(update={"steps": 16, "preset": "paper"}), None).policy
     assert (ours.observation, ours.hidden_sizes) == (DEFAULT_OBSERVATION, (256, 256))
     assert (theirs.observation, theirs.hidden_sizes) == (AUTHORS_OBSERVATION, (512, 512))
+    assert (papers.observation, papers.hidden_sizes) == (PAPER_OBSERVATION, (512, 512))
+
+
+def test_a_policy_decides_as_often_as_its_parent_unless_the_settings_say_otherwise() -> None:
+    often = replace(parent(), decision_period=0.5)
+    short = SHORT.model_copy(update={"steps": 16})
+    asked = short.model_copy(update={"decision_period_s": 2.0})
+    assert run(short, None).policy.decision_period == 1.0
+    assert run(short, often).policy.decision_period == 0.5
+    assert run(asked, often).policy.decision_period == 2.0
+    assert run(asked, None).policy.decision_period == 2.0
+
+
+def test_decisions_in_training_are_a_period_apart() -> None:
+    episodes = {}
+    for period in (0.5, 1.0):
+        settings = SHORT.model_copy(update={"decision_period_s": period})
+        curve = run(settings, None).curve
+        episodes[period] = sum(point.episodes for point in curve)
+    assert episodes[0.5] == pytest.approx(episodes[1.0] / 2, rel=0.3)
 
 
 def test_no_task_is_refused() -> None:

@@ -54,7 +54,7 @@ def watch(turn: int, *, stop_after: int | None = None) -> tuple[TrainingMonitor,
     )
     shares: list[float] = []
     monitor = TrainingMonitor(
-        observation=DEFAULT_OBSERVATION,
+        start=start,
         decisions=decisions,
         frozen_decisions=0,
         progress=shares.append,

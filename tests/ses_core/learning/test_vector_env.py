@@ -7,9 +7,11 @@ import pytest
 
 from ses_core.arrays import FloatArray
 from ses_core.learning.decision_process import DecisionProcess
+from ses_core.learning.navigation_env import NavigationEnv
 from ses_core.learning.observation import DEFAULT_OBSERVATION
 from ses_core.learning.vector_env import REWARD_SCALE, VectorNavigationEnv
 from ses_core.navigation import NavigationTask
+from ses_core.protocols import Simulator
 from ses_core.robot_profile import JACKAL
 from ses_core.settings import SimulationSettings, TrainingSettings
 from ses_core.simulation.factory import make_simulator
@@ -54,6 +56,33 @@ def test_finished_slots_start_over_and_report_their_episode() -> None:
         assert info["terminal_observation"][121] * 10.0 + 5.0 < 1.0 + 1e-3
     assert np.asarray(env.step(EVEN)[0])[:, 121].max() * 10.0 + 5.0 < 4.2
     assert rewards.sum() == pytest.approx(REWARD_SCALE * 23.3 * len(infos), rel=0.2)
+
+
+def test_a_slot_drives_and_is_rewarded_as_one_environment_is() -> None:
+    settings = SimulationSettings(stuck_time_s=6.0)
+
+    def one_slot() -> Simulator:
+        return make_simulator("batch", slots=1, profile=JACKAL, settings=settings)
+
+    process = DecisionProcess(
+        one_slot(),
+        tasks=[corridor()],
+        observation=DEFAULT_OBSERVATION,
+        profile=JACKAL,
+        settings=TrainingSettings(),
+    )
+    vector = VectorNavigationEnv(process, rng=np.random.default_rng(5))
+    single = NavigationEnv(one_slot(), tasks=[corridor()])
+    np.testing.assert_array_equal(np.asarray(vector.reset())[0], single.reset(seed=5)[0])
+    done = False
+    while not done:
+        seen, (reward,), (done,), (info,) = vector.step(EVEN[:1])
+        alone, full_reward, terminated, _, _ = single.step(EVEN[0])
+        assert done == terminated
+        assert reward == pytest.approx(REWARD_SCALE * full_reward, rel=1e-5)
+        last = info.get("terminal_observation", np.asarray(seen)[0])
+        np.testing.assert_array_equal(last, alone)
+    assert info["outcome"] == "success"
 
 
 def test_equal_seeds_give_equal_drives_and_other_seeds_others() -> None:

@@ -13,7 +13,7 @@ from ses_core.pictures.scenario_figure import (
     scenario_figure,
     scenario_rows,
 )
-from ses_core.robot_profile import JACKAL
+from ses_core.robot_profile import JACKAL, RobotProfile
 from tests.ses_core.pictures.pictured import draws, drive, extracted, pixels
 
 
@@ -42,6 +42,19 @@ def test_reversing_is_marked_and_only_where_it_happened() -> None:
         for one in (there, back)
     ]
     assert counts[1] > counts[0] + 300
+
+
+def test_the_body_of_the_robot_is_drawn_on_its_way() -> None:
+    trajectory = drive()
+    one = extracted(trajectory)[0]
+    tinted = "#eed2bc"  # a quarter of vermilion over free cells
+    inside = []
+    for radius in (0.1, 0.2):
+        robot = RobotProfile(name="disc", footprint_m=(), radius_m=radius)
+        picture = pixels(scenario_figure(one, trajectory, target=robot, scan_margin=1.0))
+        inside.append(draws(picture, tinted))
+    assert inside[0] > 100
+    assert inside[1] > 4 * inside[0]
 
 
 def test_scan_points_lie_on_the_walls() -> None:

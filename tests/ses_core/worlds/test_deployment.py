@@ -1,9 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from ses_core.arrays import FloatArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.geometry import Pose2D
-from ses_core.learning.policies import FIXED_POLICIES
+from ses_core.learning.observation import DEFAULT_OBSERVATION
+from ses_core.learning.policies import FIXED_POLICIES, ParameterPolicy, random_policy
 from ses_core.navigation import NavigationTask, World
 from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import JACKAL
@@ -99,6 +103,24 @@ def test_a_deployment_depends_on_its_number_and_seed_alone() -> None:
         assert alone[number].odometry.tobytes() == among[number].odometry.tobytes()
         assert alone[number].ranges.tobytes() == among[number].ranges.tobytes()
     assert _deploy(3, seed=1)[0].poses.tobytes() != alone[0].poses.tobytes()
+
+
+def test_a_policy_decides_as_often_as_it_was_trained_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = random_policy(DEFAULT_OBSERVATION, (8,), rng=np.random.default_rng(0))
+    counts: dict[float, int] = {0.25: 0, 1.0: 0}
+    act = ParameterPolicy.act
+
+    def counted(policy: ParameterPolicy, observations: FloatArray) -> FloatArray:
+        counts[policy.decision_period] += 1
+        return act(policy, observations)
+
+    monkeypatch.setattr(ParameterPolicy, "act", counted)
+    for period in counts:
+        policy = replace(drawn, decision_period=period)
+        (deployment,) = deploy(
+            TASKS[:1], policy, seed=0, simulation=SimulationSettings(), profile=JACKAL
+        )
+        assert counts[period] == np.ceil(deployment.times[-1] / period - 1e-9)
 
 
 def test_no_task_no_deployment() -> None:
