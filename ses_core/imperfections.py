@@ -42,7 +42,7 @@ class Imperfections(SettingsModel):
         0.0, ge=0, description="Jitter of the believed position, per tick and axis."
     )
     heading_noise_rad: float = Field(0.0, ge=0, description="Jitter of the believed heading.")
-    start_shift_m: float = Field(0.1, ge=0, description="A start is off by up to this.")
+    start_shift_m: float = Field(0.25, ge=0, description="A start is off by up to this.")
     start_turn_rad: float = Field(0.157, ge=0, description="A start is turned by up to this.")
 
 
