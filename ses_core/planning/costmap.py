@@ -247,7 +247,7 @@ def refresh_distances(slot: Slot, memory: Memory, scratch: Scratch, worker: int)
                 _keep_least_square(columns[row - bottom, into : into + reached], run[:reached])
     for row in range(bottom, top):
         start = slot.map_offset + row * width + left
-        _lower_envelope(memory.distances[start : start + span], columns[row - bottom], run)
+        _lower_envelope(memory.distances[start : start + span], columns[row - bottom])
     forget_changes(slot)
 
 
@@ -269,20 +269,18 @@ def _keep_least_square(line: Int16Array, run: Int16Array) -> None:
 
 
 @compiled
-def _lower_envelope(distances: ByteArray, line: Int16Array, best: Int16Array) -> None:
-    """Combine squared distances along columns over the 31 columns around each cell."""
-    span = distances.shape[0]
-    for cell in range(span):
-        best[cell] = line[cell + FAR_CELLS]
-    for away in range(1, FAR_CELLS):
-        squared = np.int16(away * away)
-        before = line[FAR_CELLS - away : FAR_CELLS - away + span]
-        after = line[FAR_CELLS + away : FAR_CELLS + away + span]
-        for cell in range(span):
-            nearer = np.int16(min(before[cell], after[cell]) + squared)
-            best[cell] = min(best[cell], nearer)
-    for cell in range(span):
-        distances[cell] = min(best[cell], _FAR_SQUARED)
+def _lower_envelope(distances: ByteArray, line: Int16Array) -> None:
+    """Combine squared distances along columns over the 31 columns around each cell.
+
+    Cell by cell: the inner loop is short and of fixed length, so that it is unrolled and the
+    outer one runs in vector lanes, reading each value of the line from the cache only.
+    """
+    for cell in range(distances.shape[0]):
+        best = line[cell + FAR_CELLS]
+        for away in range(1, FAR_CELLS):
+            nearer = min(line[cell + FAR_CELLS - away], line[cell + FAR_CELLS + away])
+            best = min(best, np.int16(nearer + np.int16(away * away)))
+        distances[cell] = np.uint8(min(best, _FAR_SQUARED))
 
 
 @compiled
