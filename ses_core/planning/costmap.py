@@ -289,19 +289,26 @@ def centre_window(slot: Slot, memory: Memory, number: int) -> None:
     slot.window_column = int((slot.x - slot.map_x) / RESOLUTION_M) - _HALF_WINDOW
     slot.window_row = int((slot.y - slot.map_y) / RESOLUTION_M) - _HALF_WINDOW
     window = memory.window_distances[number]
-    window[:] = 0
-    first_row, last_row = (
-        max(slot.window_row, 0),
-        min(slot.window_row + WINDOW_CELLS, slot.map_height),
-    )
+    first_row = max(slot.window_row, 0)
+    last_row = min(slot.window_row + WINDOW_CELLS, slot.map_height)
     first = max(slot.window_column, 0)
-    last = min(slot.window_column + WINDOW_CELLS, slot.map_width)
+    span = min(slot.window_column + WINDOW_CELLS, slot.map_width) - first
+    into = first - slot.window_column + 1
+    window[: first_row - slot.window_row + 1] = 0
+    window[last_row - slot.window_row + 1 :] = 0
     for row in range(first_row, last_row):
-        start = slot.map_offset + row * slot.map_width
-        into = first - slot.window_column + 1
-        window[row - slot.window_row + 1, into : into + last - first] = memory.distances[
-            start + first : start + last
-        ]
+        start = slot.map_offset + row * slot.map_width + first
+        line = window[row - slot.window_row + 1]
+        line[:into] = 0
+        line[into + span :] = 0
+        _copy(line[into : into + span], memory.distances[start : start + span])
+
+
+@compiled
+def _copy(target: ByteArray, source: ByteArray) -> None:
+    """Copy a line; numba's own assignment between slices does not run in vector lanes."""
+    for place in range(target.shape[0]):
+        target[place] = source[place]
 
 
 @compiled
