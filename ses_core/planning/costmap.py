@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ses_core.arrays import ByteArray, Float32Array, FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.simulation.robot import RobotModel
 from ses_core.simulation.state import Int16Array, Int32Array, Memory, Scratch, Slot
 
@@ -49,13 +49,13 @@ _SEEN_NOW = 2  # flag on a mark while one scan is worked in
 _HALF_DIAGONAL = 0.7072  # of a cell, rounded up
 
 
-@compiled
+@compiled_in_place
 def inflation_cells(inflation_radius: float) -> int:
     """Give the inflation radius in cells; 0.3 m are 6, whatever 0.3 / 0.05 rounds to."""
     return math.ceil(inflation_radius / RESOLUTION_M - 1e-9)
 
 
-@compiled
+@compiled_in_place
 def inflation_costs(costs: Float32Array, inflation_radius: float, inscribed_radius: float) -> None:
     """Fill the cost (256,) of each squared distance [cells^2] to the nearest obstacle.
 
@@ -77,7 +77,7 @@ def inflation_costs(costs: Float32Array, inflation_radius: float, inscribed_radi
             )
 
 
-@compiled
+@compiled_in_place
 def work_in_scan(
     slot: Slot,
     memory: Memory,
@@ -121,7 +121,7 @@ def work_in_scan(
             memory.marks[hits[k]] = 1
 
 
-@compiled
+@compiled_in_place
 def _map_index(slot: Slot, column: float, row: float) -> int:
     """Give the flat index of the map cell that holds a point [cells], or -1 outside the map."""
     if not (0.0 <= column < slot.map_width and 0.0 <= row < slot.map_height):
@@ -129,7 +129,7 @@ def _map_index(slot: Slot, column: float, row: float) -> int:
     return slot.map_offset + int(row) * slot.map_width + int(column)
 
 
-@compiled
+@compiled_in_place
 def _clear_passed(
     slot: Slot,
     memory: Memory,
@@ -192,7 +192,7 @@ def _clear_passed(
                 _note_change(slot, start + cell_column)
 
 
-@compiled
+@compiled_in_place
 def _passes(
     along_x: float,
     along_y: float,
@@ -216,7 +216,7 @@ def _passes(
     )
 
 
-@compiled
+@compiled_in_place
 def _clear_footprint(slot: Slot, memory: Memory, robot: RobotModel) -> None:
     """Forget the marks inside the padded footprint."""
     cosine, sine = math.cos(slot.yaw), math.sin(slot.yaw)
@@ -240,7 +240,7 @@ def _clear_footprint(slot: Slot, memory: Memory, robot: RobotModel) -> None:
                 memory.marks[index] = 0
 
 
-@compiled
+@compiled_in_place
 def is_inside(sides: FloatArray, x: float, y: float) -> bool:
     """Tell whether a point [m] in the robot's frame lies in a convex polygon (E, 3)."""
     is_in = True
@@ -249,7 +249,7 @@ def is_inside(sides: FloatArray, x: float, y: float) -> bool:
     return is_in
 
 
-@compiled
+@compiled_in_place
 def _note_change(slot: Slot, index: int) -> None:
     cell = index - slot.map_offset
     row = cell // slot.map_width
@@ -260,14 +260,14 @@ def _note_change(slot: Slot, index: int) -> None:
     slot.changed_top = max(slot.changed_top, row)
 
 
-@compiled
+@compiled_in_place
 def forget_changes(slot: Slot) -> None:
     """Declare every distance up to date."""
     slot.changed_left, slot.changed_right = slot.map_width, -1
     slot.changed_bottom, slot.changed_top = slot.map_height, -1
 
 
-@compiled
+@compiled_in_place
 def refresh_distances(slot: Slot, memory: Memory, scratch: Scratch, worker: int) -> None:
     """Bring the squared distances to the nearest mark up to date around changed marks; exact.
 
@@ -308,7 +308,7 @@ def refresh_distances(slot: Slot, memory: Memory, scratch: Scratch, worker: int)
 # The arithmetic below stays in 16 bits: numba would widen it to 64 and lose most vector lanes.
 
 
-@compiled
+@compiled_in_place
 def _lengthen(run: Int16Array, marks: ByteArray) -> None:
     """Count one more cell since the last mark, in every column."""
     for place in range(run.shape[0]):
@@ -316,13 +316,13 @@ def _lengthen(run: Int16Array, marks: ByteArray) -> None:
         run[place] = longer if marks[place] == 0 else np.int16(0)
 
 
-@compiled
+@compiled_in_place
 def _keep_least_square(line: Int16Array, run: Int16Array) -> None:
     for place in range(run.shape[0]):
         line[place] = min(line[place], np.int16(run[place] * run[place]))
 
 
-@compiled
+@compiled_in_place
 def _lower_envelope(distances: ByteArray, line: Int16Array) -> None:
     """Combine squared distances along columns over the 31 columns around each cell.
 
@@ -337,7 +337,7 @@ def _lower_envelope(distances: ByteArray, line: Int16Array) -> None:
         distances[cell] = np.uint8(min(best, _FAR_SQUARED))
 
 
-@compiled
+@compiled_in_place
 def centre_window(slot: Slot, memory: Memory, number: int) -> None:
     """Copy the 10 x 10 m around the robot into the slot's window; beyond the map is lethal."""
     slot.window_column = int((slot.x - slot.map_x) / RESOLUTION_M) - _HALF_WINDOW
@@ -358,14 +358,14 @@ def centre_window(slot: Slot, memory: Memory, number: int) -> None:
         _copy(line[into : into + span], memory.distances[start : start + span])
 
 
-@compiled
+@compiled_in_place
 def _copy(target: ByteArray, source: ByteArray) -> None:
     """Copy a line; numba's own assignment between slices does not run in vector lanes."""
     for place in range(target.shape[0]):
         target[place] = source[place]
 
 
-@compiled
+@compiled_in_place
 def window_place(slot: Slot, x: float, y: float) -> tuple[float, float]:
     """Give a point [m] of the world in cells of the window: (column, row)."""
     return (

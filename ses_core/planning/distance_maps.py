@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ses_core.arrays import ByteArray, Float32Array
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.planning.costmap import (
     INSCRIBED,
     RESOLUTION_M,
@@ -27,7 +27,7 @@ IMPOSSIBLE = 65534
 """From this value on, no way leads there."""
 
 
-@compiled
+@compiled_in_place
 def measure_distances(
     slot: Slot, memory: Memory, number: int, robot: RobotModel, scratch: Scratch, worker: int
 ) -> None:
@@ -71,7 +71,7 @@ def measure_distances(
         _spread(steps, queue, 1, middle * WINDOW_SIZE + middle, 2 * box + _DETOUR_CELLS)
 
 
-@compiled
+@compiled_in_place
 def _open_cells(costs: Float32Array, distances: ByteArray, steps: UInt16Array) -> None:
     """Prepare a search: bar cells of inscribed cost or more, and the window's border."""
     # Costs fall with the distance, so one comparison tells; unlike a look-up it runs in lanes.
@@ -88,7 +88,7 @@ def _open_cells(costs: Float32Array, distances: ByteArray, steps: UInt16Array) -
     steps[:, WINDOW_SIZE - 1] = BLOCKED
 
 
-@compiled
+@compiled_in_place
 def _open_footprint(slot: Slot, steps: UInt16Array, robot: RobotModel) -> None:
     """Let the search pass where the robot stands (`within_robot`)."""
     cosine, sine = math.cos(slot.yaw), math.sin(slot.yaw)
@@ -106,7 +106,7 @@ def _open_footprint(slot: Slot, steps: UInt16Array, robot: RobotModel) -> None:
                 steps[row, column] = UNREACHED
 
 
-@compiled
+@compiled_in_place
 def _spread(steps: UInt16Array, queue: Int32Array, size: int, robot: int, beyond: int) -> None:
     """Search breadth first from the queued cells; `steps` is flat, with a blocked border.
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ses_core.arrays import BoolArray, ByteArray, Float32Array, FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled, compiled_in_place
 
 
 @compiled
@@ -40,7 +40,7 @@ def chessboard_clearance(occupied: BoolArray) -> ByteArray:
     return clearance
 
 
-@compiled
+@compiled_in_place
 def cast(
     clearance: ByteArray,
     offset: int,
@@ -93,7 +93,7 @@ def cast(
     return math.inf
 
 
-@compiled
+@compiled_in_place
 def cast_scan(
     ranges: Float32Array,
     clearance: ByteArray,
