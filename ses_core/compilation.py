@@ -48,10 +48,11 @@ def compiled_in_place(function: Function) -> Function:
     An allocation, also one hidden in `ravel` or in an assignment between slices, is refused when
     the kernel is compiled.
     """
-    return cast(
-        "Function",
-        numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function),
+    # numba's type hints leave out what it has no documentation for.
+    in_place = numba.njit(  # type: ignore[call-overload]
+        cache=True, nogil=True, error_model="numpy", _nrt=False
     )
+    return cast("Function", in_place(function))
 
 
 def compiled_parallel(function: Function) -> Function:

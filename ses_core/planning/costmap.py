@@ -205,10 +205,8 @@ def _passes(
     """Tell whether a beam of a length [cells] from (column, row) passes over or ends on a cell."""
     pace = max(abs(along_x), abs(along_y))
     along_x, along_y = along_x / pace, along_y / pace
-    if abs(along_x) == 1.0:
-        step = abs(cell_column - int(column))
-    else:
-        step = abs(cell_row - int(row))
+    away_x, away_y = abs(cell_column - int(column)), abs(cell_row - int(row))
+    step = away_x if abs(along_x) == 1.0 else away_y
     return (
         step <= int(length * pace)
         and int(column + step * along_x) == cell_column
