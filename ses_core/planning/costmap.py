@@ -12,6 +12,7 @@ import numpy as np
 
 from ses_core.arrays import ByteArray, Float32Array, FloatArray
 from ses_core.compilation import compiled_in_place
+from ses_core.planning.passed_cells import beams_per_radian, is_passed
 from ses_core.simulation.robot import RobotModel
 from ses_core.simulation.state import Int16Array, Int32Array, Memory, Scratch, Slot
 
@@ -46,7 +47,6 @@ _FAR_16 = np.int16(FAR_CELLS)
 _FAR_SQUARED = np.int16(FAR)
 _BEYOND = np.int16(FAR_CELLS * FAR_CELLS)
 _SEEN_NOW = 2  # flag on a mark while one scan is worked in
-_HALF_DIAGONAL = 0.7072  # of a cell, rounded up
 
 
 @compiled_in_place
@@ -145,73 +145,28 @@ def _clear_passed(
     A beam passes over the cells at whole steps along its faster axis. There are a few hundred
     marks but tens of thousands of such steps, so each mark looks for its beams instead.
     """
-    beams = robot.beams
-    # Beams are evenly spaced from the first on; angles are relative to it, in beams per radian.
-    inverse = 1.0 / math.atan2(
-        beams[0, 0] * beams[1, 1] - beams[0, 1] * beams[1, 0],
-        beams[0, 0] * beams[1, 0] + beams[0, 1] * beams[1, 1],
-    )
-    first_x = cosine * beams[0, 0] - sine * beams[0, 1]
-    first_y = sine * beams[0, 0] + cosine * beams[0, 1]
+    per_radian = beams_per_radian(robot.beams)
     reach = int(RAYTRACE_RANGE_M / RESOLUTION_M) + 1
     left, right = max(int(column) - reach, 0), min(int(column) + reach + 1, slot.map_width)
     bottom, top = max(int(row) - reach, 0), min(int(row) + reach + 1, slot.map_height)
     for cell_row in range(bottom, top):
         start = slot.map_offset + cell_row * slot.map_width
         for cell_column in range(left, right):
-            if memory.marks[start + cell_column] != 1:
-                continue
-            away_x, away_y = cell_column + 0.5 - column, cell_row + 0.5 - row
-            angle = math.atan2(
-                first_x * away_y - first_y * away_x, first_x * away_x + first_y * away_y
-            )
-            distance = math.sqrt(away_x * away_x + away_y * away_y)
-            nearest = (distance - _HALF_DIAGONAL) * RESOLUTION_M
-            # Half the angle under which the laser sees the cell, or all around. For the arc
-            # sine stands a polynomial that is nowhere below it.
-            share = _HALF_DIAGONAL / distance
-            spread = share + 0.571 * share**3 if share < 1.0 else math.pi
-            is_passed = False
-            for turn in range(-1, 2):
-                middle, around = (angle + turn * 2.0 * math.pi) * inverse, spread * abs(inverse)
-                first = max(int(middle - around), 0)
-                last = min(int(middle + around), ranges.shape[0] - 1)
-                for beam in range(first, last + 1):
-                    if nearest <= ranges[beam] < np.inf and not is_passed:
-                        is_passed = _passes(
-                            cosine * beams[beam, 0] - sine * beams[beam, 1],
-                            sine * beams[beam, 0] + cosine * beams[beam, 1],
-                            min(ranges[beam], RAYTRACE_RANGE_M) / RESOLUTION_M,
-                            column,
-                            row,
-                            cell_column,
-                            cell_row,
-                        )
-            if is_passed:
+            if memory.marks[start + cell_column] == 1 and is_passed(
+                ranges,
+                robot.beams,
+                per_radian,
+                column,
+                row,
+                cosine,
+                sine,
+                cell_column,
+                cell_row,
+                RESOLUTION_M,
+                RAYTRACE_RANGE_M,
+            ):
                 memory.marks[start + cell_column] = 0
                 _note_change(slot, start + cell_column)
-
-
-@compiled_in_place
-def _passes(
-    along_x: float,
-    along_y: float,
-    length: float,
-    column: float,
-    row: float,
-    cell_column: int,
-    cell_row: int,
-) -> bool:
-    """Tell whether a beam of a length [cells] from (column, row) passes over or ends on a cell."""
-    pace = max(abs(along_x), abs(along_y))
-    along_x, along_y = along_x / pace, along_y / pace
-    away_x, away_y = abs(cell_column - int(column)), abs(cell_row - int(row))
-    step = away_x if abs(along_x) == 1.0 else away_y
-    return (
-        step <= int(length * pace)
-        and int(column + step * along_x) == cell_column
-        and int(row + step * along_y) == cell_row
-    )
 
 
 @compiled_in_place
