@@ -1,6 +1,7 @@
 """`ses bench`: side-by-side benchmarks, both sides in one run."""
 
 import runpy
+import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated
@@ -32,5 +33,7 @@ def bench(
         folder = Path(scratch)
         with embedded_server(folder):
             # Benchmarks are no package: they come with the checkout, not with the installation.
+            # Their helpers lie beside them, as if each was run as a script.
+            sys.path.insert(0, str(BENCHMARKS))
             rows = runpy.run_path(str(BENCHMARKS / f"{name}.py"))["measure"](folder)
     command.answer_rows(rows, empty="nothing was measured")

@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from ses_core.arrays import ByteArray, Float32Array, FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
+from ses_core.planning.passed_cells import beams_per_radian, is_passed
 from ses_core.simulation.robot import RobotModel
 from ses_core.simulation.state import Int16Array, Int32Array, Memory, Scratch, Slot
 
@@ -47,18 +48,14 @@ _FAR_SQUARED = np.int16(FAR)
 _BEYOND = np.int16(FAR_CELLS * FAR_CELLS)
 _SEEN_NOW = 2  # flag on a mark while one scan is worked in
 
-# A step along a beam goes one cell on its faster axis, at most sqrt(2) cells; where the nearest
-# mark is d cells away, what is nearer can be skipped, less 3/4 of a cell of rounding.
-_LEAPS = np.maximum(1, ((np.sqrt(np.arange(256)) - 0.75) / 1.4143).astype(np.int64))
 
-
-@compiled
+@compiled_in_place
 def inflation_cells(inflation_radius: float) -> int:
     """Give the inflation radius in cells; 0.3 m are 6, whatever 0.3 / 0.05 rounds to."""
     return math.ceil(inflation_radius / RESOLUTION_M - 1e-9)
 
 
-@compiled
+@compiled_in_place
 def inflation_costs(costs: Float32Array, inflation_radius: float, inscribed_radius: float) -> None:
     """Fill the cost (256,) of each squared distance [cells^2] to the nearest obstacle.
 
@@ -80,7 +77,7 @@ def inflation_costs(costs: Float32Array, inflation_radius: float, inscribed_radi
             )
 
 
-@compiled
+@compiled_in_place
 def work_in_scan(
     slot: Slot,
     memory: Memory,
@@ -118,12 +115,7 @@ def work_in_scan(
             memory.marks[index] |= _SEEN_NOW
             hits[count] = index
             count += 1
-    for beam in range(ranges.shape[0]):
-        if ranges[beam] < np.inf:
-            along_x = cosine * robot.beams[beam, 0] - sine * robot.beams[beam, 1]
-            along_y = sine * robot.beams[beam, 0] + cosine * robot.beams[beam, 1]
-            cells = min(ranges[beam], RAYTRACE_RANGE_M) / RESOLUTION_M
-            _clear_along(slot, memory, column, row, along_x, along_y, cells)
+    _clear_passed(slot, memory, ranges, robot, column, row, cosine, sine)
     if clears_footprint:
         _clear_footprint(slot, memory, robot)
     for k in range(count):
@@ -134,7 +126,7 @@ def work_in_scan(
             memory.marks[hits[k]] = 1
 
 
-@compiled
+@compiled_in_place
 def _map_index(slot: Slot, column: float, row: float) -> int:
     """Give the flat index of the map cell that holds a point [cells], or -1 outside the map."""
     if not (0.0 <= column < slot.map_width and 0.0 <= row < slot.map_height):
@@ -142,32 +134,47 @@ def _map_index(slot: Slot, column: float, row: float) -> int:
     return slot.map_offset + int(row) * slot.map_width + int(column)
 
 
-@compiled
-def _clear_along(
+@compiled_in_place
+def _clear_passed(
     slot: Slot,
     memory: Memory,
+    ranges: Float32Array,
+    robot: RobotModel,
     column: float,
     row: float,
-    along_x: float,
-    along_y: float,
-    length: float,
+    cosine: float,
+    sine: float,
 ) -> None:
-    """Clear the marks on one beam, its last cell included, leaping where none are near."""
-    pace = max(abs(along_x), abs(along_y))
-    along_x, along_y = along_x / pace, along_y / pace
-    steps = int(length * pace)
-    step = 0
-    while step <= steps:
-        index = _map_index(slot, column + step * along_x, row + step * along_y)
-        if index < 0:
-            return
-        if memory.marks[index] == 1:
-            memory.marks[index] = 0
-            _note_change(slot, index)
-        step += _LEAPS[memory.distances[index]]
+    """Clear the marks that beams pass over or end on, for a laser at (column, row) [cells].
+
+    A beam passes over the cells at whole steps along its faster axis. There are a few hundred
+    marks but tens of thousands of such steps, so each mark looks for its beams instead.
+    """
+    per_radian = beams_per_radian(robot.beams)
+    reach = int(RAYTRACE_RANGE_M / RESOLUTION_M) + 1
+    left, right = max(int(column) - reach, 0), min(int(column) + reach + 1, slot.map_width)
+    bottom, top = max(int(row) - reach, 0), min(int(row) + reach + 1, slot.map_height)
+    for cell_row in range(bottom, top):
+        start = slot.map_offset + cell_row * slot.map_width
+        for cell_column in range(left, right):
+            if memory.marks[start + cell_column] == 1 and is_passed(
+                ranges,
+                robot.beams,
+                per_radian,
+                column,
+                row,
+                cosine,
+                sine,
+                cell_column,
+                cell_row,
+                RESOLUTION_M,
+                RAYTRACE_RANGE_M,
+            ):
+                memory.marks[start + cell_column] = 0
+                _note_change(slot, start + cell_column)
 
 
-@compiled
+@compiled_in_place
 def _clear_footprint(slot: Slot, memory: Memory, robot: RobotModel) -> None:
     """Forget the marks inside the padded footprint."""
     cosine, sine = math.cos(slot.yaw), math.sin(slot.yaw)
@@ -191,7 +198,7 @@ def _clear_footprint(slot: Slot, memory: Memory, robot: RobotModel) -> None:
                 memory.marks[index] = 0
 
 
-@compiled
+@compiled_in_place
 def is_inside(sides: FloatArray, x: float, y: float) -> bool:
     """Tell whether a point [m] in the robot's frame lies in a convex polygon (E, 3)."""
     is_in = True
@@ -200,7 +207,7 @@ def is_inside(sides: FloatArray, x: float, y: float) -> bool:
     return is_in
 
 
-@compiled
+@compiled_in_place
 def _note_change(slot: Slot, index: int) -> None:
     cell = index - slot.map_offset
     row = cell // slot.map_width
@@ -211,14 +218,14 @@ def _note_change(slot: Slot, index: int) -> None:
     slot.changed_top = max(slot.changed_top, row)
 
 
-@compiled
+@compiled_in_place
 def forget_changes(slot: Slot) -> None:
     """Declare every distance up to date."""
     slot.changed_left, slot.changed_right = slot.map_width, -1
     slot.changed_bottom, slot.changed_top = slot.map_height, -1
 
 
-@compiled
+@compiled_in_place
 def refresh_distances(slot: Slot, memory: Memory, scratch: Scratch, worker: int) -> None:
     """Bring the squared distances to the nearest mark up to date around changed marks; exact.
 
@@ -252,14 +259,14 @@ def refresh_distances(slot: Slot, memory: Memory, scratch: Scratch, worker: int)
                 _keep_least_square(columns[row - bottom, into : into + reached], run[:reached])
     for row in range(bottom, top):
         start = slot.map_offset + row * width + left
-        _lower_envelope(memory.distances[start : start + span], columns[row - bottom], run)
+        _lower_envelope(memory.distances[start : start + span], columns[row - bottom])
     forget_changes(slot)
 
 
 # The arithmetic below stays in 16 bits: numba would widen it to 64 and lose most vector lanes.
 
 
-@compiled
+@compiled_in_place
 def _lengthen(run: Int16Array, marks: ByteArray) -> None:
     """Count one more cell since the last mark, in every column."""
     for place in range(run.shape[0]):
@@ -267,51 +274,56 @@ def _lengthen(run: Int16Array, marks: ByteArray) -> None:
         run[place] = longer if marks[place] == 0 else np.int16(0)
 
 
-@compiled
+@compiled_in_place
 def _keep_least_square(line: Int16Array, run: Int16Array) -> None:
     for place in range(run.shape[0]):
         line[place] = min(line[place], np.int16(run[place] * run[place]))
 
 
-@compiled
-def _lower_envelope(distances: ByteArray, line: Int16Array, best: Int16Array) -> None:
-    """Combine squared distances along columns over the 31 columns around each cell."""
-    span = distances.shape[0]
-    for cell in range(span):
-        best[cell] = line[cell + FAR_CELLS]
-    for away in range(1, FAR_CELLS):
-        squared = np.int16(away * away)
-        before = line[FAR_CELLS - away : FAR_CELLS - away + span]
-        after = line[FAR_CELLS + away : FAR_CELLS + away + span]
-        for cell in range(span):
-            nearer = np.int16(min(before[cell], after[cell]) + squared)
-            best[cell] = min(best[cell], nearer)
-    for cell in range(span):
-        distances[cell] = min(best[cell], _FAR_SQUARED)
+@compiled_in_place
+def _lower_envelope(distances: ByteArray, line: Int16Array) -> None:
+    """Combine squared distances along columns over the 31 columns around each cell.
+
+    Cell by cell: the inner loop is short and of fixed length, so that it is unrolled and the
+    outer one runs in vector lanes, reading each value of the line from the cache only.
+    """
+    for cell in range(distances.shape[0]):
+        best = line[cell + FAR_CELLS]
+        for away in range(1, FAR_CELLS):
+            nearer = min(line[cell + FAR_CELLS - away], line[cell + FAR_CELLS + away])
+            best = min(best, np.int16(nearer + np.int16(away * away)))
+        distances[cell] = np.uint8(min(best, _FAR_SQUARED))
 
 
-@compiled
+@compiled_in_place
 def centre_window(slot: Slot, memory: Memory, number: int) -> None:
     """Copy the 10 x 10 m around the robot into the slot's window; beyond the map is lethal."""
     slot.window_column = int((slot.x - slot.map_x) / RESOLUTION_M) - _HALF_WINDOW
     slot.window_row = int((slot.y - slot.map_y) / RESOLUTION_M) - _HALF_WINDOW
     window = memory.window_distances[number]
-    window[:] = 0
-    first_row, last_row = (
-        max(slot.window_row, 0),
-        min(slot.window_row + WINDOW_CELLS, slot.map_height),
-    )
+    first_row = max(slot.window_row, 0)
+    last_row = min(slot.window_row + WINDOW_CELLS, slot.map_height)
     first = max(slot.window_column, 0)
-    last = min(slot.window_column + WINDOW_CELLS, slot.map_width)
+    span = min(slot.window_column + WINDOW_CELLS, slot.map_width) - first
+    into = first - slot.window_column + 1
+    window[: first_row - slot.window_row + 1] = 0
+    window[last_row - slot.window_row + 1 :] = 0
     for row in range(first_row, last_row):
-        start = slot.map_offset + row * slot.map_width
-        into = first - slot.window_column + 1
-        window[row - slot.window_row + 1, into : into + last - first] = memory.distances[
-            start + first : start + last
-        ]
+        start = slot.map_offset + row * slot.map_width + first
+        line = window[row - slot.window_row + 1]
+        line[:into] = 0
+        line[into + span :] = 0
+        _copy(line[into : into + span], memory.distances[start : start + span])
 
 
-@compiled
+@compiled_in_place
+def _copy(target: ByteArray, source: ByteArray) -> None:
+    """Copy a line; numba's own assignment between slices does not run in vector lanes."""
+    for place in range(target.shape[0]):
+        target[place] = source[place]
+
+
+@compiled_in_place
 def window_place(slot: Slot, x: float, y: float) -> tuple[float, float]:
     """Give a point [m] of the world in cells of the window: (column, row)."""
     return (

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ses_core.arrays import ByteArray, Float32Array
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.planning.costmap import (
     INSCRIBED,
     RESOLUTION_M,
@@ -19,6 +19,7 @@ from ses_core.simulation.state import Int32Array, Memory, Scratch, Slot, UInt16A
 
 UNREACHED = np.uint16(65535)
 BLOCKED = np.uint16(65534)
+_ONE, _ROW = np.uint64(1), np.uint64(WINDOW_SIZE)
 _DETOUR_CELLS = 20
 _PLAN_MARGIN_CELLS = 10
 
@@ -26,7 +27,7 @@ IMPOSSIBLE = 65534
 """From this value on, no way leads there."""
 
 
-@compiled
+@compiled_in_place
 def measure_distances(
     slot: Slot, memory: Memory, number: int, robot: RobotModel, scratch: Scratch, worker: int
 ) -> None:
@@ -47,9 +48,11 @@ def measure_distances(
     _open_cells(memory.costs[number], memory.window_distances[number], goal)
     _open_footprint(slot, goal, robot)
     path[:] = BLOCKED
-    path[low : high + 1, low : high + 1] = goal[low : high + 1, low : high + 1]
+    for row in range(low, high + 1):
+        for column in range(low, high + 1):
+            path[row, column] = goal[row, column]
     size, last = 0, -1
-    steps = path.ravel()
+    steps = path.reshape(path.size)
     for k in range(slot.plan_size):
         column = int(plan[k, 0]) - slot.window_column + 1
         row = int(plan[k, 1]) - slot.window_row + 1
@@ -62,28 +65,30 @@ def measure_distances(
             size += 1
     _spread(steps, queue, size, -1, 0)
     if last >= 0:
-        steps = goal.ravel()
+        steps = goal.reshape(goal.size)
         steps[last] = 0
         queue[0] = last
         _spread(steps, queue, 1, middle * WINDOW_SIZE + middle, 2 * box + _DETOUR_CELLS)
 
 
-@compiled
+@compiled_in_place
 def _open_cells(costs: Float32Array, distances: ByteArray, steps: UInt16Array) -> None:
     """Prepare a search: bar cells of inscribed cost or more, and the window's border."""
-    bars = np.empty(256, dtype=np.uint16)
-    for squared in range(256):
-        bars[squared] = BLOCKED if costs[squared] >= INSCRIBED else UNREACHED
+    # Costs fall with the distance, so one comparison tells; unlike a look-up it runs in lanes.
+    barred = 0
+    while costs[barred] >= INSCRIBED:
+        barred += 1
+    nearest = np.uint8(barred)
     for row in range(WINDOW_SIZE):
         for column in range(WINDOW_SIZE):
-            steps[row, column] = bars[distances[row, column]]
+            steps[row, column] = UNREACHED if distances[row, column] >= nearest else BLOCKED
     steps[0, :] = BLOCKED
     steps[WINDOW_SIZE - 1, :] = BLOCKED
     steps[:, 0] = BLOCKED
     steps[:, WINDOW_SIZE - 1] = BLOCKED
 
 
-@compiled
+@compiled_in_place
 def _open_footprint(slot: Slot, steps: UInt16Array, robot: RobotModel) -> None:
     """Let the search pass where the robot stands (`within_robot`)."""
     cosine, sine = math.cos(slot.yaw), math.sin(slot.yaw)
@@ -101,21 +106,24 @@ def _open_footprint(slot: Slot, steps: UInt16Array, robot: RobotModel) -> None:
                 steps[row, column] = UNREACHED
 
 
-@compiled
+@compiled_in_place
 def _spread(steps: UInt16Array, queue: Int32Array, size: int, robot: int, beyond: int) -> None:
     """Search breadth first from the queued cells; `steps` is flat, with a blocked border.
 
     The search ends so many steps `beyond` the cell `robot`, or never where that is -1.
     """
-    head = 0
-    while head < size:
-        cell = queue[head]
-        head += 1
-        following = np.uint16(steps[cell] + 1)
-        if robot >= 0 and steps[robot] < BLOCKED and following > steps[robot] + beyond:
+    first, step = 0, np.uint16(0)
+    while first < size:
+        step = np.uint16(step + 1)
+        if robot >= 0 and steps[robot] < BLOCKED and step > steps[robot] + beyond:
             return
-        for neighbour in (cell - 1, cell + 1, cell - WINDOW_SIZE, cell + WINDOW_SIZE):
-            if steps[neighbour] == UNREACHED:
-                steps[neighbour] = following
-                queue[size] = neighbour
-                size += 1
+        last = size
+        for k in range(first, last):
+            # Unsigned indices spare numba's test for negative ones in this busiest of loops.
+            cell = np.uint64(queue[np.uint64(k)])
+            for neighbour in (cell - _ONE, cell + _ONE, cell - _ROW, cell + _ROW):
+                if steps[neighbour] == UNREACHED:
+                    steps[neighbour] = step
+                    queue[np.uint64(size)] = np.int32(neighbour)
+                    size += 1
+        first = last

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from ses_core.arrays import BoolArray, Float32Array, FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled, compiled_in_place
 from ses_core.occupancy import OccupancyGrid, cell_indices
 from ses_core.planning.costmap import RESOLUTION_M
 from ses_core.planning.potential import (
@@ -24,7 +24,7 @@ PLAN_REACH_M = 5.3
 """The plan is followed until it leaves the local costmap (5 m) or is 1200 half cells long."""
 
 
-@compiled
+@compiled_in_place
 def update_plan(
     slot: Slot,
     memory: Memory,
@@ -56,7 +56,7 @@ def update_plan(
     _point_ahead(slot, memory, number)
 
 
-@compiled
+@compiled_in_place
 def _follow(slot: Slot, memory: Memory, number: int) -> bool:
     """Write the plan ahead of the robot; False where the potential no longer tells the truth."""
     width, height = slot.map_width, slot.map_height
@@ -93,7 +93,7 @@ def _follow(slot: Slot, memory: Memory, number: int) -> bool:
     return True
 
 
-@compiled
+@compiled_in_place
 def _descend(
     potential: Float32Array, width: int, x: float, y: float, cell: int
 ) -> tuple[float, float]:
@@ -127,7 +127,7 @@ def _descend(
     return best % width + 0.5, best // width + 0.5
 
 
-@compiled
+@compiled_in_place
 def _point_ahead(slot: Slot, memory: Memory, number: int) -> None:
     """Set the local goal: the first point of the plan more than 1 m away, else its end."""
     plan = memory.plans[number]

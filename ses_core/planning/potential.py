@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.planning.costmap import INSCRIBED, LETHAL, RESOLUTION_M
 from ses_core.simulation.state import Memory, Scratch, Slot
 
@@ -21,13 +21,13 @@ _START_RADIUS_CELLS = 7.0
 _SQRT_HALF = math.sqrt(0.5)
 
 
-@compiled
+@compiled_in_place
 def _passing_cost(cost: float) -> float:
     """Give NavFn's cost of entering a cell of a costmap cost."""
     return min(NEUTRAL_COST + COST_FACTOR * cost, HIGHEST_COST)
 
 
-@compiled
+@compiled_in_place
 def entering_cost(slot: Slot, memory: Memory, number: int, cell: int, start: int) -> float:
     """Give the cost of entering a cell, or 0 where it is barred.
 
@@ -45,7 +45,7 @@ def entering_cost(slot: Slot, memory: Memory, number: int, cell: int, start: int
     return 0.0
 
 
-@compiled
+@compiled_in_place
 def spread_potential(
     slot: Slot, memory: Memory, number: int, scratch: Scratch, worker: int
 ) -> bool:
@@ -120,7 +120,7 @@ def spread_potential(
     return bool(potential[start] < UNREACHED)
 
 
-@compiled
+@compiled_in_place
 def _interpolate(across: float, along: float, cost: float) -> float:
     """Give a cell's potential from its lowest neighbours on both axes (NavFn's quadratic)."""
     low, high = min(across, along), max(across, along)
@@ -130,7 +130,7 @@ def _interpolate(across: float, along: float, cost: float) -> float:
     return low + cost * (-0.2301 * share * share + 0.5307 * share + 0.7040)
 
 
-@compiled
+@compiled_in_place
 def cell_at(slot: Slot, x: float, y: float) -> int:
     """Give the map cell that holds a point [m], or -1 at or beyond the map's rim."""
     column = math.floor((x - slot.map_x) / RESOLUTION_M)
@@ -140,7 +140,7 @@ def cell_at(slot: Slot, x: float, y: float) -> int:
     return row * slot.map_width + column
 
 
-@compiled
+@compiled_in_place
 def _open_cell_near(slot: Slot, memory: Memory, number: int, cell: int, start: int) -> int:
     """Give the nearest passable cell within 1 m of a cell, or -1.
 

@@ -8,7 +8,7 @@ episode that goes nowhere ends as stuck.
 
 import math
 
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.planning.rollouts import HITS, SIM_TIME_S, rollout_cost
 from ses_core.simulation.robot import RobotModel
 from ses_core.simulation.state import Memory, Slot
@@ -22,7 +22,7 @@ _FASTEST = 1.0
 """rotate_recovery's defaults [rad/s^2, rad/s]: it reads names the Jackal's files do not set."""
 
 
-@compiled
+@compiled_in_place
 def recover(slot: Slot, memory: Memory, number: int, robot: RobotModel, period: float) -> bool:
     """Start or continue the rotate recovery, if it is due, and set its command.
 
@@ -48,7 +48,7 @@ def recover(slot: Slot, memory: Memory, number: int, robot: RobotModel, period: 
     return True
 
 
-@compiled
+@compiled_in_place
 def _turn_hits(slot: Slot, memory: Memory, number: int, robot: RobotModel) -> bool:
     """Tell whether the padded outline would meet a lethal cell during the rest of the turn."""
     cost = rollout_cost(

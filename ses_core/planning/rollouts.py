@@ -3,7 +3,7 @@
 import math
 
 from ses_core.arrays import ByteArray, Float32Array
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.planning.costmap import (
     RESOLUTION_M,
     WINDOW_SIZE,
@@ -25,7 +25,7 @@ NO_WAY = -2.0
 """Costs of a roll-out whose outline meets a lethal cell; that enters a cell no way leads from."""
 
 
-@compiled
+@compiled_in_place
 def rollout_cost(
     slot: Slot,
     memory: Memory,
@@ -85,7 +85,7 @@ def rollout_cost(
     return worst
 
 
-@compiled
+@compiled_in_place
 def _harmless_distance(slot: Slot, robot: RobotModel) -> int:
     """Give the squared distance [cells^2] of the centre from which no outline cell has a cost."""
     reach = inflation_cells(slot.inflation_radius) + robot.circumscribed_radius / RESOLUTION_M
@@ -93,7 +93,7 @@ def _harmless_distance(slot: Slot, robot: RobotModel) -> int:
     return math.ceil((reach + math.sqrt(2.0)) ** 2)
 
 
-@compiled
+@compiled_in_place
 def _pose_cost(
     distances: ByteArray,
     costs: Float32Array,

@@ -17,7 +17,7 @@ Simplified, and why:
 import math
 
 from ses_core.arrays import FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.planning.costmap import RESOLUTION_M, WINDOW_SIZE, window_place
 from ses_core.planning.distance_maps import IMPOSSIBLE
 from ses_core.planning.rollouts import NO_WAY, SIM_TIME_S, rollout_cost
@@ -30,7 +30,7 @@ MAX_VTHETA_SAMPLES = 64
 _MAX_VEL_X, _MAX_VEL_THETA, _VX_SAMPLES, _VTHETA_SAMPLES, _PATH_BIAS, _GOAL_BIAS = range(6)
 
 
-@compiled
+@compiled_in_place
 def velocity_window(
     velocity: float, lowest: float, highest: float, acceleration: float, period: float
 ) -> tuple[float, float]:
@@ -41,7 +41,7 @@ def velocity_window(
     )
 
 
-@compiled
+@compiled_in_place
 def find_command(
     slot: Slot,
     memory: Memory,
@@ -111,13 +111,13 @@ def find_command(
     return _escape(slot, memory, number, robot)
 
 
-@compiled
+@compiled_in_place
 def _forward_turn(place: int, w_low: float, w_step: float) -> float:
     """Give the turn rate of a forward sample: straight first, then from the window's low end."""
     return 0.0 if place == 0 else w_low + (place - 1) * w_step
 
 
-@compiled
+@compiled_in_place
 def _best_forward(
     slot: Slot,
     memory: Memory,
@@ -166,7 +166,7 @@ def _best_forward(
             best, best_cost = sample, cost
 
 
-@compiled
+@compiled_in_place
 def _end_cost(
     path: UInt16Array, goal: UInt16Array, x: float, y: float, parameters: FloatArray
 ) -> float:
@@ -180,7 +180,7 @@ def _end_cost(
     return RESOLUTION_M * (parameters[_PATH_BIAS] * to_path + parameters[_GOAL_BIAS] * to_goal)
 
 
-@compiled
+@compiled_in_place
 def _prefer_turning(
     slot: Slot,
     memory: Memory,
@@ -225,7 +225,7 @@ def _prefer_turning(
     return best_cost, best_v, best_w
 
 
-@compiled
+@compiled_in_place
 def _note_oscillation(slot: Slot, robot: RobotModel, v: float, w: float) -> None:
     """Bar turning back after turning twice one way, until the robot has moved on.
 
@@ -243,7 +243,7 @@ def _note_oscillation(slot: Slot, robot: RobotModel, v: float, w: float) -> None
     _reset_oscillation(slot, robot)
 
 
-@compiled
+@compiled_in_place
 def _reset_oscillation(slot: Slot, robot: RobotModel) -> None:
     moved = math.hypot(slot.x - slot.oscillation_x, slot.y - slot.oscillation_y)
     if moved > robot.oscillation_reset_dist:
@@ -251,7 +251,7 @@ def _reset_oscillation(slot: Slot, robot: RobotModel) -> None:
         slot.is_stuck_left, slot.is_stuck_right = False, False
 
 
-@compiled
+@compiled_in_place
 def _end_escape(slot: Slot, robot: RobotModel) -> None:
     """Allow forward samples again once the robot got away."""
     moved = math.hypot(slot.x - slot.escape_x, slot.y - slot.escape_y)
@@ -262,7 +262,7 @@ def _end_escape(slot: Slot, robot: RobotModel) -> None:
         slot.is_escaping = False
 
 
-@compiled
+@compiled_in_place
 def _escape(slot: Slot, memory: Memory, number: int, robot: RobotModel) -> bool:
     """Back up, even where the map shows an obstacle; not where no way leads from."""
     cost = rollout_cost(slot, memory, number, robot, robot.escape_vel, 0.0, False, math.inf)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ses_core.arrays import BoolArray, ByteArray, Float32Array, FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled, compiled_in_place
 
 
 @compiled
@@ -40,7 +40,7 @@ def chessboard_clearance(occupied: BoolArray) -> ByteArray:
     return clearance
 
 
-@compiled
+@compiled_in_place
 def cast(
     clearance: ByteArray,
     offset: int,
@@ -79,21 +79,21 @@ def cast(
             return travelled
         if near > 2:
             travelled += (near - 1) * pace
-            column = math.floor(x + travelled * along_x)
-            row = math.floor(y + travelled * along_y)
+            # Inside the grid coordinates are positive: cutting off is cheaper than rounding down.
+            column = int(x + travelled * along_x)
+            row = int(y + travelled * along_y)
             continue
         to_x = (column + face_x - x) * inverse_x if along_x != 0.0 else math.inf
         to_y = (row + face_y - y) * inverse_y if along_y != 0.0 else math.inf
-        if to_x < to_y:
-            column += step_x
-            travelled = max(travelled, to_x)
-        else:
-            row += step_y
-            travelled = max(travelled, to_y)
+        # Which face comes first is as good as random: selecting is cheaper than branching.
+        is_column = to_x < to_y
+        column += step_x if is_column else 0
+        row += 0 if is_column else step_y
+        travelled = max(travelled, to_x if is_column else to_y)
     return math.inf
 
 
-@compiled
+@compiled_in_place
 def cast_scan(
     ranges: Float32Array,
     clearance: ByteArray,

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 
 if TYPE_CHECKING:
     from ses_core.simulation.state import Slot
@@ -21,7 +21,7 @@ _MEAN_OF_FOUR = 2.0 * 65535.0
 _DEVIATION_OF_FOUR = float(np.sqrt(4.0 * (65536.0**2 - 1.0) / 12.0))
 
 
-@compiled
+@compiled_in_place
 def draw_bits(slot: "Slot") -> np.uint64:
     """Advance the slot's state and give 64 random bits (SplitMix64, Steele et al. 2014)."""
     slot.random_state = slot.random_state + _STEP
@@ -31,13 +31,13 @@ def draw_bits(slot: "Slot") -> np.uint64:
     return bits ^ (bits >> _SHIFT_31)
 
 
-@compiled
+@compiled_in_place
 def draw_uniform(slot: "Slot") -> float:
     """Draw from [0, 1)."""
     return float(draw_bits(slot) >> _SHIFT_11) * 2.0**-53
 
 
-@compiled
+@compiled_in_place
 def draw_normal(slot: "Slot") -> float:
     """Draw a number of mean 0 and deviation 1, close to normal and never beyond 3.47.
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ses_core.arrays import ByteArray, FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled_in_place
 from ses_core.robot_profile import RobotProfile
 
 OUTLINE_SPACING_M = 0.165
@@ -123,13 +123,13 @@ def _points_along(corners: FloatArray) -> FloatArray:
     return np.array(points, dtype=np.float64)
 
 
-@compiled
+@compiled_in_place
 def approach(value: float, target: float, step: float) -> float:
     """Move a value towards a target by at most a step."""
     return min(max(target, value - step), value + step)
 
 
-@compiled
+@compiled_in_place
 def drive(
     x: float, y: float, yaw: float, v: float, w: float, time: float
 ) -> tuple[float, float, float]:
@@ -146,13 +146,13 @@ def drive(
     )
 
 
-@compiled
+@compiled_in_place
 def wrap(angle: float) -> float:
     """Bring an angle [rad] into (-pi, pi]."""
     return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
 
 
-@compiled
+@compiled_in_place
 def touches(
     robot: RobotModel,
     x: float,
