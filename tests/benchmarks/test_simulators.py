@@ -8,6 +8,7 @@ import pytest
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
+@pytest.mark.timeout(900)  # a fresh checkout compiles all kernels here, beside other tests
 def test_every_promise_has_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     measure = runpy.run_path(str(BENCHMARKS / "simulators.py"))["measure"]
