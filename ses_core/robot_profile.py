@@ -65,6 +65,12 @@ class RobotProfile(SettingsModel):
     max_turn_rate_radps: float = Field(4.0, gt=0, description="Fastest it can turn.")
     acc_lim_x_mps2: float = Field(10.0, gt=0, description="Planner's acceleration limit.")
     acc_lim_theta_radps2: float = Field(20.0, gt=0, description="Planner's angular limit.")
+    sideslip_s: float = Field(
+        0.04,
+        ge=0,
+        description="Skidding outwards in a turn: sideways speed over the product of speed and "
+        "turn rate; as the four-wheeled robot does in PyBullet. 0 for one that does not skid.",
+    )
     command_timeout_s: float = Field(
         0.25, gt=0, description="A command holds this long, then the base stops (cmd_vel_timeout)."
     )
@@ -148,6 +154,7 @@ TURTLEBOT4 = RobotProfile(
     max_turn_rate_radps=1.9,
     acc_lim_x_mps2=0.9,
     acc_lim_theta_radps2=7.725,
+    sideslip_s=0.0,
     command_timeout_s=0.5,
     laser=LaserProfile(
         angle_min_rad=-math.pi, angle_max_rad=math.pi, range_max_m=12.0, range_min_m=0.15
@@ -163,6 +170,7 @@ NEATO = RobotProfile(
     max_turn_rate_radps=4.0,
     acc_lim_x_mps2=1.0,
     acc_lim_theta_radps2=4.0,
+    sideslip_s=0.0,
     command_timeout_s=1.0,
     laser=LaserProfile(
         beams=361, angle_min_rad=0.0, angle_max_rad=2 * math.pi, range_max_m=5.0, range_min_m=0.02
@@ -178,6 +186,7 @@ RASPIMOUSE = RobotProfile(
     max_turn_rate_radps=6.0,
     acc_lim_x_mps2=1.0,
     acc_lim_theta_radps2=6.0,
+    sideslip_s=0.0,
     command_timeout_s=1.0,
     laser=LaserProfile(
         beams=726, angle_min_rad=-2.36, angle_max_rad=2.09, range_max_m=5.6, range_min_m=0.02
@@ -191,6 +200,7 @@ GENERIC = RobotProfile(
     footprint_padding_m=0.03,
     max_speed_mps=3.0,
     max_turn_rate_radps=6.0,
+    sideslip_s=0.0,
     command_timeout_s=0.5,
     laser=LaserProfile(beams=361, range_max_m=30.0, range_min_m=0.02),
 )

@@ -84,7 +84,15 @@ def robot_urdf(frame: RobotFrame, *, name: str) -> str:
         y = (0.5 if wheel.endswith("left") else -0.5) * frame.track
         shape = f'<cylinder radius="{frame.wheel_radius:.5f}" length="{frame.wheel_width:.5f}"/>'
         links.append(
-            _link(wheel, shape, frame.wheel_mass, _wheel_inertia(frame), colour="0.1 0.1 0.1 1")
+            _link(
+                wheel,
+                shape,
+                frame.wheel_mass,
+                _wheel_inertia(frame),
+                colour="0.1 0.1 0.1 1",
+                # One point of contact: a cylinder rolls on changing corners and pulls aside.
+                touches_as=f'<sphere radius="{frame.wheel_radius:.5f}"/>',
+            )
         )
         links.append(
             f'<joint name="{wheel}" type="continuous"><parent link="chassis"/>'
@@ -95,7 +103,13 @@ def robot_urdf(frame: RobotFrame, *, name: str) -> str:
 
 
 def _link(
-    name: str, shape: str, mass: float, inertia: tuple[float, float, float], *, colour: str
+    name: str,
+    shape: str,
+    mass: float,
+    inertia: tuple[float, float, float],
+    *,
+    colour: str,
+    touches_as: str = "",
 ) -> str:
     ixx, iyy, izz = inertia
     return (
@@ -103,7 +117,7 @@ def _link(
         f'<inertia ixx="{ixx:.7f}" iyy="{iyy:.7f}" izz="{izz:.7f}" ixy="0" ixz="0" iyz="0"/>'
         f"</inertial><visual><geometry>{shape}</geometry>"
         f'<material name="{name}"><color rgba="{colour}"/></material></visual>'
-        f"<collision><geometry>{shape}</geometry></collision></link>"
+        f"<collision><geometry>{touches_as or shape}</geometry></collision></link>"
     )
 
 

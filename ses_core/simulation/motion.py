@@ -49,6 +49,9 @@ def move(slot: Slot, memory: Memory, number: int, robot: RobotModel, setup: Cond
     has_contact = False
     for _ in range(pieces):
         next_x, next_y, next_yaw = drive(x, y, yaw, v, w, setup.period / pieces)
+        skid = robot.sideslip * v * w * setup.period / pieces
+        next_x += skid * math.sin(next_yaw)
+        next_y -= skid * math.cos(next_yaw)
         if touches(
             robot,
             next_x - slot.world_x,

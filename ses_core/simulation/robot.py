@@ -30,6 +30,7 @@ class RobotModel(NamedTuple):
     max_turn_rate: float
     acceleration: float
     turn_acceleration: float
+    sideslip: float  # [s]
     min_vel_x: float
     min_in_place_vel_theta: float
     escape_vel: float
@@ -68,6 +69,7 @@ def robot_model(profile: RobotProfile) -> RobotModel:
         max_turn_rate=profile.max_turn_rate_radps,
         acceleration=profile.acc_lim_x_mps2,
         turn_acceleration=profile.acc_lim_theta_radps2,
+        sideslip=profile.sideslip_s,
         min_vel_x=profile.planner.min_vel_x,
         min_in_place_vel_theta=profile.planner.min_in_place_vel_theta,
         escape_vel=profile.planner.escape_vel,
