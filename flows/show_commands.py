@@ -1,11 +1,14 @@
-"""`ses show`: a picture and the facts of a log, a scenario or an environment."""
+"""`ses show`: a picture and the facts of a log, a scenario, an environment or an episode."""
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer._click.core import Context  # see flows/command_arguments.py on typer's own parser
+from typer.core import TyperCommand
 
+from flows import episode_commands
 from flows.command_context import aligned, command_context
 from ses_core.recipes import JsonValue
 
@@ -21,10 +24,32 @@ IdArgument = Annotated[
     str, typer.Argument(metavar="ID", help="Of a scenario, an environment or a log.")
 ]
 TABLES = {"scenarios": "scenario_id", "environments": "environment_id", "logs": "log_id"}
+EPISODE = "episode"
 UNSHOWN = ("cells", "observed")
 
 
-@app.command(epilog="Example: ses show 0f3c9a51d2b7e864 --out scenario.png")
+class ShowCommand(TyperCommand):
+    """`ses show ID`; what follows `ses show episode` is a command of its own."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: Context | None = None,
+        **extra: Any,
+    ) -> Context:
+        """Prepare the command that the first argument asks for."""
+        if args[:1] == [EPISODE]:
+            command = typer.main.get_command(episode_commands.app)
+            return command.make_context(f"{info_name} {EPISODE}", args[1:], parent, **extra)
+        return super().make_context(info_name, args, parent, **extra)
+
+
+@app.command(
+    cls=ShowCommand,
+    epilog="Example: ses show 0f3c9a51d2b7e864 --out scenario.png "
+    "(an evaluation's trial: ses show episode --help)",
+)
 def show(
     context: typer.Context,
     identity: IdArgument,

@@ -89,6 +89,14 @@ class Simulator(Protocol):
         """Give a copy of every slot's state."""
         ...
 
+    def costmap(self, number: int) -> "Costmap":
+        """Give the map that one slot's robot has built, under its inflation radius."""
+        ...
+
+    def plan(self, number: int) -> FloatArray:
+        """Give one slot's global plan (P, 2) [m], in the frame of its costmap."""
+        ...
+
     def close(self) -> None:
         """Release what is held open."""
         ...
@@ -145,6 +153,25 @@ class SimulatorState(Protocol):
     @property
     def outcomes(self) -> IntArray:
         """`EpisodeOutcome` values (N,); RUNNING while unfinished."""
+        ...
+
+
+class Costmap(Protocol):
+    """What a robot believes about its surroundings, for a picture."""
+
+    @property
+    def costs(self) -> Float32Array:
+        """Costs (H, W) from 0 (free) over 253 (its centre must not be there) to 254 (occupied)."""
+        ...
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Lower left corner [m]."""
+        ...
+
+    @property
+    def resolution(self) -> float:
+        """Edge of a cell [m]."""
         ...
 
 

@@ -43,22 +43,22 @@ _SELECTED = ("scenario_id", "rank", "count", "environment_id")
 
 
 def _write_episodes(directory: Path, night: NightArtifacts, *, store: LocalArtifactStore) -> None:
-    refs = {"batch": night.evaluation, "bullet": night.spot_check}
-    columns: dict[str, list[str | int | float]] = {}
-    for simulator, ref in refs.items():
-        if ref is None:
-            continue
-        # Two simulators drive the same trials: the id of an episode has to say which one did.
-        episodes = [
-            replace(episode, run_id=night.run_id, episode_id=f"{episode.episode_id}-{simulator}")
-            for episode in read_episodes(store.path(ref))
-        ]
-        part: dict[str, list[str | int | float]] = {
-            **episode_columns(episodes),
-            "simulator": [*[simulator] * len(episodes)],
-        }
-        columns = {name: [*columns.get(name, []), *values] for name, values in part.items()}
-    write_table(directory / EPISODES_FILE, "episodes", columns)
+    driven = [
+        episode
+        for ref in (night.evaluation, night.spot_check)
+        if ref is not None
+        for episode in read_episodes(store.path(ref))
+    ]
+    # Two simulators drive the same trials: the id of an episode has to say which one did.
+    episodes = [
+        replace(
+            episode,
+            run_id=night.run_id,
+            episode_id=f"{episode.episode_id}-{episode.simulator}",
+        )
+        for episode in driven
+    ]
+    write_table(directory / EPISODES_FILE, "episodes", episode_columns(episodes))
 
 
 def _write_policy_row(directory: Path, night: NightArtifacts, *, store: LocalArtifactStore) -> None:

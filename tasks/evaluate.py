@@ -4,20 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from prefect import task
 from prefect.cache_policies import NO_CACHE
 
 from ses_core.errors import SesError, WorldError
+from ses_core.evaluation.places import crossing_places, sampled_places
 from ses_core.evaluation.statistics import summarize
-from ses_core.evaluation.trials import EvaluationTask, evaluate, evaluation_task
-from ses_core.navigation import NavigationDomain, NavigationTask, World, environment_task
+from ses_core.evaluation.trials import EvaluationTask, evaluate
+from ses_core.navigation import NavigationTask, environment_task
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, digest_json, settings_json
-from ses_core.robot_profile import RobotProfile
-from ses_core.settings import EvaluationSettings, Settings
+from ses_core.settings import Settings
 from ses_core.simulation.factory import SimulatorName
 from ses_core.worlds.identity import content_digest
-from ses_core.worlds.pairs import sample_tasks
 from storage.artifact_store import LocalArtifactStore
 from storage.environment_files import read_environments
 from storage.evaluation_files import write_evaluation
@@ -45,37 +43,6 @@ class HeldoutWorlds:
     paths: tuple[Path, ...] = ()
     part: str | None = None
     resolution: float | None = None
-
-
-def crossing_places(domain: NavigationDomain, profile: RobotProfile) -> list[EvaluationTask]:
-    """Make one pair of each environment: across it, from the bottom to the top."""
-    return [
-        evaluation_task(environment_task(environment), pair=0, profile=profile)
-        for environment in domain.environments
-    ]
-
-
-def sampled_places(
-    worlds: Sequence[World], *, settings: EvaluationSettings, profile: RobotProfile
-) -> list[EvaluationTask]:
-    """Draw start-goal pairs in worlds; one too small for any pair gives none.
-
-    The pairs of a world depend on its cells and the seed alone, not on the worlds beside it.
-    """
-    places = []
-    for world in worlds:
-        seed = [settings.seed, int(content_digest(world.grid)[:8], 16)]
-        tasks = sample_tasks(
-            world,
-            settings.pairs,
-            profile=profile,
-            min_distance=settings.min_distance_m,
-            rng=np.random.default_rng(seed),
-        )
-        places += [
-            evaluation_task(one, pair=pair, profile=profile) for pair, one in enumerate(tasks)
-        ]
-    return places
 
 
 def heldout_digest(source: HeldoutWorlds) -> str:

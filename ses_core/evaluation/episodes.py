@@ -14,7 +14,10 @@ BARN_FASTEST, BARN_SLOWEST = 2.0, 8.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Episode:
-    """One trial; the fields are the columns of the table `episodes`."""
+    """One trial; the fields are the columns of the table `episodes`.
+
+    With its world and policy, seed, start and goal are enough to drive it again.
+    """
 
     episode_id: str
     run_id: str
@@ -29,6 +32,12 @@ class Episode:
     optimal_time_s: float
     barn_score: float
     negative_velocity_count: int
+    simulator: str
+    start_x_m: float
+    start_y_m: float
+    start_yaw_rad: float
+    goal_x_m: float
+    goal_y_m: float
 
 
 def barn_score(outcome: EpisodeOutcome, *, time: float, optimal_time: float) -> float:

@@ -4,7 +4,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
@@ -13,11 +12,11 @@ from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.learning.policies import initial_parameters, observer_for, policy_ticks
 from ses_core.navigation import NavigationTask
 from ses_core.planning.global_planner import optimal_path_length
-from ses_core.protocols import Policy, Simulator
+from ses_core.protocols import Policy, Simulator, SimulatorState
 from ses_core.recipes import digest_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
-from ses_core.simulation.factory import make_simulator
+from ses_core.simulation.factory import SimulatorName, make_simulator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,8 +35,13 @@ class EvaluationTask:
 
 
 @dataclass(frozen=True, slots=True)
-class _Trial:
-    """A trial still to be driven; it is the same for every policy."""
+class Trial:
+    """A trial to be driven; it is the same for every policy.
+
+    Attributes:
+        number: Its number among the trials of its pair.
+        seed: Of the robot's and the sensor's noise in this trial.
+    """
 
     place: EvaluationTask
     number: int
@@ -64,6 +68,12 @@ def evaluation_task(task: NavigationTask, *, pair: int, profile: RobotProfile) -
     )
 
 
+def trial_of(place: EvaluationTask, number: int, *, seed: int) -> Trial:
+    """Give a pair's trial in the evaluation with a seed: 31 bits of the digest of what names it."""
+    named = digest_json([seed, place.world_id, place.pair, number])
+    return Trial(place, number, int(named[:8], 16) >> 1)
+
+
 def evaluate(
     policies: Mapping[str, Policy],
     places: Sequence[EvaluationTask],
@@ -72,7 +82,7 @@ def evaluate(
     seed: int,
     simulation: SimulationSettings,
     profile: RobotProfile,
-    simulator: Literal["batch", "bullet"] = "batch",
+    simulator: SimulatorName = "batch",
     slots: int = 64,
     run_id: str = "",
     progress: Callable[[float], None] = lambda _: None,
@@ -103,11 +113,7 @@ def evaluate(
     pairs = [(place.world_id, place.pair) for place in places]
     if len(set(pairs)) < len(pairs):
         raise ValueError(f"{len(pairs)} places have {len(set(pairs))} different worlds and pairs")
-    schedule = [
-        _Trial(place, number, _trial_seed(seed, place, number))
-        for place in places
-        for number in range(trials)
-    ]
+    schedule = [trial_of(place, number, seed=seed) for place in places for number in range(trials)]
     if not schedule:
         return []
     total = len(schedule) * len(policies)
@@ -124,6 +130,7 @@ def evaluate(
                 schedule,
                 driver,
                 profile=profile,
+                simulator_name=simulator,
                 run_id=run_id,
                 finished=partial(_report, progress, before, total),
             )
@@ -139,10 +146,11 @@ def _report(progress: Callable[[float], None], before: int, total: int, count: i
 def _drive(
     name: str,
     policy: Policy,
-    schedule: Sequence[_Trial],
+    schedule: Sequence[Trial],
     simulator: Simulator,
     *,
     profile: RobotProfile,
+    simulator_name: SimulatorName,
     run_id: str,
     finished: Callable[[int], None],
 ) -> list[Episode]:
@@ -169,30 +177,39 @@ def _drive(
         state = simulator.state()
         idle = np.flatnonzero((state.outcomes != EpisodeOutcome.RUNNING) & (driven >= 0))
         for slot in idle:
-            episodes[int(driven[slot])] = _episode(
+            episodes[int(driven[slot])] = finished_episode(
                 schedule[driven[slot]],
+                state,
+                int(slot),
                 policy=name,
+                simulator=simulator_name,
                 run_id=run_id,
-                outcome=EpisodeOutcome(int(state.outcomes[slot])),
-                time=float(state.times[slot]),
-                path_length=float(state.path_lengths[slot]),
-                negative_count=int(state.negative_counts[slot]),
             )
         finished(len(episodes))
     return [episodes[number] for number in range(len(schedule))]
 
 
-def _episode(
-    trial: _Trial,
+def finished_episode(
+    trial: Trial,
+    state: SimulatorState,
+    slot: int,
     *,
     policy: str,
-    run_id: str,
-    outcome: EpisodeOutcome,
-    time: float,
-    path_length: float,
-    negative_count: int,
+    simulator: SimulatorName,
+    run_id: str = "",
 ) -> Episode:
+    """Give the row of the trial that ended in a slot.
+
+    Args:
+        trial: What was driven.
+        state: Of the simulator, once the episode has ended.
+        slot: Where it was driven.
+        policy: Name of who drove.
+        simulator: Name of where.
+        run_id: The run that the episode belongs to.
+    """
     place = trial.place
+    outcome, time = EpisodeOutcome(int(state.outcomes[slot])), float(state.times[slot])
     return Episode(
         episode_id=digest_json(
             [run_id, policy, place.world_id, place.pair, trial.number, trial.seed]
@@ -205,13 +222,14 @@ def _episode(
         seed=trial.seed,
         outcome=outcome.name.lower(),
         time_s=time,
-        path_length_m=path_length,
+        path_length_m=float(state.path_lengths[slot]),
         optimal_time_s=place.optimal_time_s,
         barn_score=barn_score(outcome, time=time, optimal_time=place.optimal_time_s),
-        negative_velocity_count=negative_count,
+        negative_velocity_count=int(state.negative_counts[slot]),
+        simulator=simulator,
+        start_x_m=place.task.start.x,
+        start_y_m=place.task.start.y,
+        start_yaw_rad=place.task.start.yaw,
+        goal_x_m=place.task.goal[0],
+        goal_y_m=place.task.goal[1],
     )
-
-
-def _trial_seed(seed: int, place: EvaluationTask, number: int) -> int:
-    """Seed of one trial: 31 bits of the digest of what names it."""
-    return int(digest_json([seed, place.world_id, place.pair, number])[:8], 16) >> 1

@@ -24,7 +24,7 @@ from ses_core.navigation import NavigationTask
 from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
-from ses_core.simulation.batch import BatchSimulator
+from ses_core.simulation.batch import BatchSimulator, CostmapView
 from ses_core.simulation.jackal_urdf import CHASSIS_LINK, WHEELS, robot_frame, robot_urdf
 from ses_core.simulation.rendering import RenderedWorld, render
 from ses_core.simulation.state import BatchState
@@ -105,6 +105,14 @@ class BulletSimulator:
     def state(self) -> BatchState:
         """Give a copy of every slot's state."""
         return self._stack.state()
+
+    def costmap(self, number: int) -> CostmapView:
+        """Give the map one slot has built, under its inflation radius."""
+        return self._stack.costmap(number)
+
+    def plan(self, number: int) -> FloatArray:
+        """Give one slot's global plan (P, 2) [m] as far as the local planner sees it."""
+        return self._stack.plan(number)
 
     def still(self, number: int, *, width: int = 640, height: int = 480) -> ByteArray:
         """Photograph a slot's robot from behind and above: (height, width, 3)."""

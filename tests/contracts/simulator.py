@@ -19,6 +19,7 @@ def check_simulator(make: Callable[[int], Simulator], *, beams: int = 720) -> No
     """Hold the seam's promises against what `make(slots)` makes with default settings."""
     _check_shapes(make(2), beams)
     _check_a_straight_drive(make(1))
+    _check_what_the_robot_believes(make(1))
     _check_same_seed_same_bytes(make)
     _check_finished_slots_stay(make(2))
 
@@ -65,6 +66,21 @@ def _check_a_straight_drive(simulator: Simulator) -> None:
     assert 4.0 < state.times[0] < 6.0
     assert state.negative_counts.tolist() == [0]
     np.testing.assert_allclose(state.poses[0], [2.0, 0.0, 0.0], atol=0.15)
+    simulator.close()
+
+
+def _check_what_the_robot_believes(simulator: Simulator) -> None:
+    simulator.reset(np.arange(1), [_task()], np.array([3]))
+    simulator.advance(_parameters(simulator), SECOND)
+    costmap, plan = simulator.costmap(0), simulator.plan(0)
+    assert costmap.costs.min() == 0.0
+    assert costmap.costs.max() == 254.0
+    row, _ = np.nonzero(costmap.costs == 254.0)
+    # The sides of the hall: the wall cells nearest to it begin at y = -1.9 m and end at 1.9 m.
+    assert abs(costmap.origin[1] + costmap.resolution * (row.min() + 0.5) + 1.9) < 0.15
+    assert abs(costmap.origin[1] + costmap.resolution * (row.max() + 0.5) - 1.9) < 0.15
+    np.testing.assert_allclose(plan[0], simulator.state().odometry[0, :2], atol=0.1)
+    np.testing.assert_allclose(plan[-1], [3.0, 0.0], atol=0.1)
     simulator.close()
 
 

@@ -242,4 +242,10 @@ def episode(policy: str, world: int) -> Episode:
         optimal_time_s=4.0,
         barn_score=0.2,
         negative_velocity_count=3,
+        simulator="batch",
+        start_x_m=1.0,
+        start_y_m=1.5,
+        start_yaw_rad=0.0,
+        goal_x_m=8.0,
+        goal_y_m=1.5,
     )

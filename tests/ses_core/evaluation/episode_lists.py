@@ -30,6 +30,12 @@ def episode(
         optimal_time_s=optimal,
         barn_score=barn_score(EpisodeOutcome[outcome.upper()], time=time, optimal_time=optimal),
         negative_velocity_count=3,
+        simulator="batch",
+        start_x_m=1.0,
+        start_y_m=1.5,
+        start_yaw_rad=0.0,
+        goal_x_m=8.0,
+        goal_y_m=1.5,
     )
 
 
