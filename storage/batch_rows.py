@@ -34,20 +34,20 @@ class BatchRows:
     environments: pd.DataFrame
 
 
-def read_batch_rows(store: LocalArtifactStore, *, newest: date) -> BatchRows:
+def read_batch_rows(store: LocalArtifactStore, tables: TableLog, *, newest: date) -> BatchRows:
     """Read the rows of every log, batch by batch.
 
     Args:
         store: Where they are kept.
+        tables: Where they are listed.
         newest: The batch under way.
 
     Raises:
         ArtifactError: A part is missing or damaged.
     """
-    log = TableLog(store.layout)
-    day_of = {entry.log_id: entry.batch_date for entry in catalogue(log)}
+    day_of = {entry.log_id: entry.batch_date for entry in catalogue(tables)}
     batches: defaultdict[date, list[TablePart]] = defaultdict(list)
-    for part in (part for table in TABLES for part in log.parts(table)):
+    for part in (part for table in TABLES for part in tables.parts(table)):
         if part.name in day_of:
             batches[day_of[part.name]].append(part)
     files: dict[str, list[Path]] = {table: [] for table in TABLES}

@@ -54,10 +54,14 @@ def extraction_recipe(
 
 @task(name="look for scenarios extracted before", cache_policy=NO_CACHE)
 def look_for_scenarios(
-    logs: Sequence[CatalogueEntry], *, store: LocalArtifactStore, settings: Settings
+    logs: Sequence[CatalogueEntry],
+    *,
+    store: LocalArtifactStore,
+    tables: TableLog,
+    settings: Settings,
 ) -> ExtractionState:
     """Divide the logs into those whose scenarios are in the tables and those still to do."""
-    shown = {part.ref for part in TableLog(store.layout).parts("scenarios")}
+    shown = {part.ref for part in tables.parts("scenarios")}
     site_maps = read_site_maps(settings.extraction.site_maps)
     refs = {log: store.find(extraction_recipe(log, settings, site_maps)) for log in logs}
     pending = tuple(log for log, ref in refs.items() if ref is None or ref not in shown)
@@ -69,7 +73,12 @@ def look_for_scenarios(
 
 @task(name="extract scenarios", task_run_name="extract log {log.log_id:.12}", cache_policy=NO_CACHE)
 def extract_scenarios(
-    log: CatalogueEntry, *, store: LocalArtifactStore, settings: Settings, anew: bool = False
+    log: CatalogueEntry,
+    *,
+    store: LocalArtifactStore,
+    tables: TableLog,
+    settings: Settings,
+    anew: bool = False,
 ) -> Materialized:
     """Cut one log's trajectories into scenarios and rebuild each one's place."""
     site_maps = read_site_maps(settings.extraction.site_maps)
@@ -99,5 +108,5 @@ def extract_scenarios(
 
     made = materialize(store, extraction_recipe(log, settings, site_maps), build, anew=anew)
     parts = artifact_parts(store, made.ref, name=log.log_id, batch_date=log.batch_date)
-    TableLog(store.layout).commit(parts, message=f"scenarios of log {log.log_id}")
+    tables.commit(parts, message=f"scenarios of log {log.log_id}")
     return conclude(made)

@@ -29,9 +29,9 @@ def store_of_two_days(root: Path) -> LocalArtifactStore:
 
 def test_rows_are_the_same_whether_a_day_is_old_or_under_way(tmp_path: Path) -> None:
     store = store_of_two_days(tmp_path)
-    log_by_log = read_batch_rows(store, newest=OLD)
+    log_by_log = read_batch_rows(store, TableLog(store.layout), newest=OLD)
     assert batches(store) == set()
-    by_day = read_batch_rows(store, newest=NEW)
+    by_day = read_batch_rows(store, TableLog(store.layout), newest=NEW)
     assert len(batches(store)) == 1
     for table in TABLES:
         ours, theirs = getattr(by_day, table), getattr(log_by_log, table)
@@ -41,10 +41,10 @@ def test_rows_are_the_same_whether_a_day_is_old_or_under_way(tmp_path: Path) -> 
 
 def test_an_old_day_is_put_together_once_and_anew_when_it_changed(tmp_path: Path) -> None:
     store = store_of_two_days(tmp_path)
-    read_batch_rows(store, newest=NEW)
+    read_batch_rows(store, TableLog(store.layout), newest=NEW)
     first = batches(store)
-    read_batch_rows(store, newest=NEW)
+    read_batch_rows(store, TableLog(store.layout), newest=NEW)
     assert batches(store) == first
     commit_sample(store, TableLog(store.layout), "d", day=OLD, tables=OF_A_LOG)
-    assert len(read_batch_rows(store, newest=NEW).scenarios) == 12
+    assert len(read_batch_rows(store, TableLog(store.layout), newest=NEW).scenarios) == 12
     assert len(batches(store)) == 2
