@@ -43,7 +43,10 @@ class TableLog:
 
     def parts(self, table: str) -> tuple[TablePart, ...]:
         """List the parts of a table as of now, in the order of their places."""
-        return tuple(part for part in self.all_parts() if part.table == table)
+        with self._lock:
+            self._refresh()
+            found = [(slot, part) for slot, part in self._parts.items() if part.table == table]
+        return tuple(part for _, part in sorted(found))
 
     def all_parts(self) -> tuple[TablePart, ...]:
         """List the parts of all tables as of now, in the order of their places."""

@@ -46,6 +46,7 @@ def select_scenarios(
             last_batch=last_batch,
             map_logs=frozenset(logs.loc[logs["pose_source"] == "map", "log_id"]),
         )
-        write_selection(directory, selection, rows.environments)
+        chosen = {*selection.pool["environment_id"], *selection.heldout["environment_id"]}
+        write_selection(directory, selection, rows.whole_environments(chosen))
 
     return conclude(materialize(store, recipe, build, anew=anew))
