@@ -4,7 +4,7 @@ import datetime as dt
 import time
 from typing import Any
 
-from flows.night_stages import Night, batch_logs
+from flows.night_stages import Night
 from flows.night_summary import STAGES, ComparisonRow, EvaluationRow
 from ses_core.evaluation.comparison import compare
 from ses_core.evaluation.decision import NightDecision, decide, decide_without_training
@@ -12,6 +12,7 @@ from ses_core.evaluation.statistics import summarize
 from ses_core.recipes import ArtifactRef
 from storage.batch_manifest import RunRecord, StageRecord, read_manifest, record_run
 from storage.evaluation_files import read_episodes
+from storage.log_catalogue import catalogue
 from storage.night_artifacts import NightArtifacts
 from storage.policy_files import find_policy, read_policy
 from storage.quarantine import Quarantine
@@ -83,7 +84,9 @@ def conclude_night(night: Night, artifacts: NightArtifacts, *, is_demonstration:
             "is_demonstration": is_demonstration,
         }
     )
-    made = report_night.submit(night_page, store=store, anew="report" in night.anew).result()
+    made = report_night.submit(
+        night_page, store=store, tables=night.tables, anew="report" in night.anew
+    ).result()
     night.count("report", made)
     summary.report = str(store.layout.report_page(artifacts.batch_date))
     _record(night, artifacts)
@@ -97,7 +100,7 @@ def _artifacts(
     decision: NightDecision,
     **refs: Any,
 ) -> NightArtifacts:
-    logs = batch_logs(night, day)
+    logs = [log for log in catalogue(night.tables) if log.batch_date == day]
     refused = [
         (entry.relative, entry.reason, entry.message)
         for entry in Quarantine(night.store.layout.quarantine).entries()

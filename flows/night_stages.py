@@ -14,7 +14,7 @@ from storage.artifact_store import LocalArtifactStore
 from storage.batch_manifest import LogRecord, make_run_id
 from storage.disk_space import require_free_space
 from storage.environment_files import read_environments
-from storage.log_catalogue import CatalogueEntry, catalogue, last_batch
+from storage.log_catalogue import catalogue, last_batch
 from storage.materialize import Materialized
 from storage.policy_files import find_policy
 from storage.quarantine import Quarantine
@@ -35,6 +35,7 @@ class Night:
     """One night under way.
 
     Attributes:
+        tables: Opened once for the whole night.
         today: Day of the batch that new logs go into.
         anew: Stages that are built although their results are there.
         summary: What has been done so far; grows from stage to stage.
@@ -43,6 +44,7 @@ class Night:
     """
 
     store: LocalArtifactStore
+    tables: TableLog
     settings: Settings
     today: dt.date
     anew: frozenset[StageName]
@@ -77,6 +79,7 @@ def open_night(
     with run_lock(store.layout, purpose=purpose):
         yield Night(
             store=store,
+            tables=TableLog(store.layout),
             settings=settings,
             today=today,
             anew=stages_from(refresh),
@@ -89,21 +92,30 @@ def open_night(
 def take_in_logs(night: Night, inbox: Path) -> None:
     """Take in every new log of the inbox, and those that an older decoder had refused."""
     started = time.perf_counter()
-    store, settings = night.store, night.settings.ingest
+    store, tables, settings = night.store, night.tables, night.settings.ingest
     scan = look_through_inbox.submit(inbox, store=store, settings=settings).result()
     is_anew = "ingest" in night.anew
-    batch_of = {log.log_id: log.batch_date for log in catalogue(TableLog(store.layout))}
+    batch_of = {log.log_id: log.batch_date for log in catalogue(tables)}
     uploads = [(candidate, night.today) for candidate in scan.new]
     if is_anew:
         uploads += [
             (known.candidate, batch_of.get(known.entry.log_id, night.today)) for known in scan.known
         ]
     futures = [
-        ingest_log.submit(candidate, batch_date=batch, store=store, settings=settings, anew=is_anew)
+        ingest_log.submit(
+            candidate,
+            batch_date=batch,
+            store=store,
+            tables=tables,
+            settings=settings,
+            anew=is_anew,
+        )
         for candidate, batch in uploads
     ]
     futures += [
-        retry_log.submit(refused, batch_date=night.today, store=store, settings=settings)
+        retry_log.submit(
+            refused, batch_date=night.today, store=store, tables=tables, settings=settings
+        )
         for refused in refused_by_older_decoders(store)
     ]
     taken = [future.result() for future in futures]
@@ -136,13 +148,13 @@ def take_in_logs(night: Night, inbox: Path) -> None:
 def extract_logs(night: Night) -> list[ArtifactRef]:
     """Extract every log that is not yet extracted under today's settings; give all results."""
     started = time.perf_counter()
-    store, settings = night.store, night.settings
-    logs = catalogue(TableLog(store.layout))
-    state = look_for_scenarios.submit(logs, store=store, settings=settings).result()
+    store, tables, settings = night.store, night.tables, night.settings
+    logs = catalogue(tables)
+    state = look_for_scenarios.submit(logs, store=store, tables=tables, settings=settings).result()
     is_anew = "extract" in night.anew
     pending = logs if is_anew else state.pending
     futures = [
-        extract_scenarios.submit(log, store=store, settings=settings, anew=is_anew)
+        extract_scenarios.submit(log, store=store, tables=tables, settings=settings, anew=is_anew)
         for log in pending
     ]
     made = [future.result() for future in futures]
@@ -159,14 +171,9 @@ def batch_day(night: Night) -> dt.date:
 
     The pool's window ends there, so that nothing is built anew because a day went by.
     """
-    taken = last_batch(catalogue(TableLog(night.store.layout)))
+    taken = last_batch(catalogue(night.tables))
     refused = [entry.batch_date for entry in Quarantine(night.store.layout.quarantine).entries()]
     return max([*refused, *([taken] if taken else [])], default=night.today)
-
-
-def batch_logs(night: Night, day: dt.date) -> list[CatalogueEntry]:
-    """List the logs of one batch."""
-    return [log for log in catalogue(TableLog(night.store.layout)) if log.batch_date == day]
 
 
 def select_places(
@@ -179,6 +186,7 @@ def select_places(
             extracted,
             last_batch=day,
             store=night.store,
+            tables=night.tables,
             settings=night.settings.filter,
             anew="filter" in night.anew,
         ).result(),

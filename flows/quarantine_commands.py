@@ -69,6 +69,7 @@ def retry(
     from storage.ingestion import take_in_again
     from storage.quarantine import Quarantine
     from storage.run_lock import run_lock
+    from storage.table_log import TableLog
 
     command = command_context(context)
     settings = command.settings().ingest
@@ -79,9 +80,14 @@ def retry(
     display = ProgressDisplay()
     rows: list[dict[str, JsonValue]] = []
     with run_lock(store.layout, purpose="ses quarantine retry"):
+        tables = TableLog(store.layout)
         for done, refused in enumerate(chosen, start=1):
             taken = take_in_again(
-                refused, batch_date=datetime.now(UTC).date(), store=store, settings=settings
+                refused,
+                batch_date=datetime.now(UTC).date(),
+                store=store,
+                tables=tables,
+                settings=settings,
             )
             rows.append(
                 {

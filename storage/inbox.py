@@ -188,14 +188,23 @@ def _list(inbox: Path, settings: IngestSettings) -> tuple[list[Candidate], int]:
 
 
 def _walk(inbox: Path) -> Iterator[tuple[Path, list[str]]]:
-    def refuse(error: OSError) -> None:
-        raise ArtifactError(f"inbox {inbox} cannot be read: {error}") from error
-
-    for folder, folders, names in os.walk(inbox, onerror=refuse, followlinks=False):
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
-        links = [name for name in folders if (Path(folder) / name).is_symlink()]
-        visible = [name for name in (*names, *links) if not name.startswith(".")]
-        yield Path(folder), sorted(visible)
+    """Give every folder with what it holds beside folders; a link to one is no folder."""
+    folders = [inbox]
+    while folders:
+        folder = folders.pop()
+        names: list[str] = []
+        try:
+            with os.scandir(folder) as entries:
+                for entry in entries:
+                    if entry.name.startswith("."):
+                        continue
+                    if entry.is_dir(follow_symlinks=False):
+                        folders.append(folder / entry.name)
+                    else:
+                        names.append(entry.name)
+        except OSError as error:
+            raise ArtifactError(f"inbox {inbox} cannot be read: {error}") from error
+        yield folder, sorted(names)
 
 
 def _write_ahead_files(path: Path, names: list[str]) -> tuple[Path, ...]:

@@ -60,6 +60,7 @@ def take_in(
     *,
     batch_date: date,
     store: LocalArtifactStore,
+    tables: TableLog,
     settings: IngestSettings,
     anew: bool = False,
 ) -> TakenIn:
@@ -69,6 +70,7 @@ def take_in(
         candidate: The upload.
         batch_date: Day of the batch it belongs to.
         store: Where it is kept.
+        tables: Where its rows are shown.
         settings: How it is decoded and put on the clock.
         anew: Decode it although its content is known.
 
@@ -99,7 +101,13 @@ def take_in(
             found=True,
         )
     return _take_in(
-        claimed, upload, batch_date=batch_date, store=store, settings=settings, anew=anew
+        claimed,
+        upload,
+        batch_date=batch_date,
+        store=store,
+        tables=tables,
+        settings=settings,
+        anew=anew,
     )
 
 
@@ -108,6 +116,7 @@ def take_in_again(
     *,
     batch_date: date,
     store: LocalArtifactStore,
+    tables: TableLog,
     settings: IngestSettings,
 ) -> TakenIn:
     """Try a refused log once more, from the copy that quarantine keeps.
@@ -131,7 +140,13 @@ def take_in_again(
     )
     claimed = ClaimedLog(refused.log_id, copy, refused.format)
     taken = _take_in(
-        claimed, upload, batch_date=batch_date, store=store, settings=settings, anew=False
+        claimed,
+        upload,
+        batch_date=batch_date,
+        store=store,
+        tables=tables,
+        settings=settings,
+        anew=False,
     )
     if taken.status == "new":
         Quarantine(store.layout.quarantine).release(refused.log_id)
@@ -144,6 +159,7 @@ def _take_in(
     *,
     batch_date: date,
     store: LocalArtifactStore,
+    tables: TableLog,
     settings: IngestSettings,
     anew: bool,
 ) -> TakenIn:
@@ -154,7 +170,7 @@ def _take_in(
     except LogError as error:
         return _refuse(error, claimed, upload, batch_date=batch_date, store=store)
     parts = artifact_parts(store, made.ref, name=claimed.log_id, batch_date=batch_date)
-    TableLog(store.layout).commit(parts, message=f"log {claimed.log_id}")
+    tables.commit(parts, message=f"log {claimed.log_id}")
     # Last: what the ledger knows is not looked at again.
     _record(upload, LedgerEntry(claimed.log_id, "taken"), store=store)
     _discard(claimed.payload)

@@ -106,11 +106,12 @@ class Layout:
 
     def object_folder(self, ref: ArtifactRef) -> Path:
         """Give the folder of an artifact."""
-        return self.objects / ref.kind / ref.digest
+        # In one step: a night asks this hundreds of times, and every `/` makes a path anew.
+        return self.root.joinpath("objects", ref.kind, ref.digest)
 
     def recipe_file(self, stage: str, key: str) -> Path:
         """Give the file that answers a recipe."""
-        return self.recipes / stage / f"{key}.json"
+        return self.root.joinpath("recipes", stage, f"{key}.json")
 
     def table_folder(self, name: str) -> Path:
         """Give the folder of a table."""

@@ -4,6 +4,7 @@ The entries are the truth; the folders under `tables/` are a view of them that i
 to date after every commit and whenever the log is opened, so that a crash in between heals.
 """
 
+import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,7 +25,11 @@ _CHECKPOINTS_KEPT = 2
 
 
 class TableLog:
-    """The parts of all tables; several processes may commit at once, each thread with its own."""
+    """The parts of all tables; several processes, and the threads of each, may commit at once.
+
+    Opening it reads the whole list of parts, every later look only what has been added since: a
+    night opens it once.
+    """
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
@@ -33,17 +38,21 @@ class TableLog:
         self._parts: dict[str, TablePart] = {}
         self._number = 0
         self._digest = NO_ENTRY
+        self._lock = threading.RLock()
         self.publish()
 
     def parts(self, table: str) -> tuple[TablePart, ...]:
         """List the parts of a table as of now, in the order of their places."""
-        self._refresh()
-        return tuple(part for _, part in sorted(self._parts.items()) if part.table == table)
+        with self._lock:
+            self._refresh()
+            found = [(slot, part) for slot, part in self._parts.items() if part.table == table]
+        return tuple(part for _, part in sorted(found))
 
     def all_parts(self) -> tuple[TablePart, ...]:
         """List the parts of all tables as of now, in the order of their places."""
-        self._refresh()
-        return tuple(part for _, part in sorted(self._parts.items()))
+        with self._lock:
+            self._refresh()
+            return tuple(part for _, part in sorted(self._parts.items()))
 
     def commit(
         self, add: Sequence[TablePart], remove: Sequence[TablePart] = (), *, message: str
@@ -62,28 +71,12 @@ class TableLog:
         """
         for part in add:
             self._check_source(part)
-        while True:
-            self._refresh()
-            new = [part for part in add if self._parts.get(part.slot) != part]
-            gone = [part for part in remove if part.slot in self._parts]
-            if not new and not gone:
-                break
-            content: dict[str, JsonValue] = {
-                "message": message,
-                "created_stamp_ns": time.time_ns(),
-                "add": [part.as_json() for part in new],
-                "remove": [part.slot for part in gone],
-            }
-            entry = self._log.append(self._number + 1, self._digest, content)
-            if entry is not None:
-                self._take(entry)
-                if entry.number % _CHECKPOINT_EVERY == 0:
-                    self._save_checkpoint()
-                break
-        self.publish()
-        # A file that was damaged and built again must replace its damaged link.
-        self._show_again(add)
-        return self._number
+        with self._lock:
+            self._append(add, remove, message=message)
+            self.publish()
+            # A file that was damaged and built again must replace its damaged link.
+            self._show_again(add)
+            return self._number
 
     def publish(self, *, anew: bool = False) -> None:
         """Bring the folders under `tables/` up to the newest entry.
@@ -94,7 +87,7 @@ class TableLog:
         published = None if anew else self._view.published()
         if published is not None and self._log.read(published + 1) is None:
             return
-        with file_lock(self._layout.publish_lock):
+        with self._lock, file_lock(self._layout.publish_lock):
             # Another process may have published in the meantime.
             published = None if anew else self._view.published()
             changes: dict[str, TablePart | None] = {}
@@ -109,6 +102,30 @@ class TableLog:
                     changes.update(_changes(entry))
                     number = entry.number
             self._view.apply(changes, number=number)
+
+    def _append(
+        self, add: Sequence[TablePart], remove: Sequence[TablePart], *, message: str
+    ) -> None:
+        """Put an entry behind the newest one, unless it would change nothing."""
+        while True:
+            self._refresh()
+            new = [part for part in add if self._parts.get(part.slot) != part]
+            gone = [part for part in remove if part.slot in self._parts]
+            if not new and not gone:
+                return
+            content: dict[str, JsonValue] = {
+                "message": message,
+                "created_stamp_ns": time.time_ns(),
+                "add": [part.as_json() for part in new],
+                "remove": [part.slot for part in gone],
+            }
+            entry = self._log.append(self._number + 1, self._digest, content)
+            if entry is None:
+                continue
+            self._take(entry)
+            if entry.number % _CHECKPOINT_EVERY == 0:
+                self._save_checkpoint()
+            return
 
     def _refresh(self) -> None:
         """Read the entries that came since the last time."""

@@ -1,6 +1,6 @@
 """Extract: one log's trajectories to scenarios with their places (section III-B)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from prefect.cache_policies import NO_CACHE
 
 from ses_core.extraction.extract import extract
 from ses_core.extraction.robot_matching import profile_named
-from ses_core.recipes import ArtifactRef, Recipe, settings_json
+from ses_core.recipes import ArtifactRef, JsonValue, Recipe, settings_json
 from ses_core.settings import Settings
 from storage.artifact_store import LocalArtifactStore
 from storage.log_catalogue import CatalogueEntry
@@ -32,34 +32,36 @@ class ExtractionState:
     found: bool
 
 
-def extraction_recipe(
-    log: CatalogueEntry, settings: Settings, site_maps: Mapping[str, SiteMap]
-) -> Recipe:
-    """Say what decides a log's scenarios: its trajectories, the settings, the target robot.
+def extraction_recipes(
+    logs: Iterable[CatalogueEntry], settings: Settings, site_maps: Mapping[str, SiteMap]
+) -> dict[CatalogueEntry, Recipe]:
+    """Say what decides each log's scenarios: its trajectories, the settings, the target robot.
 
     `is_challenging` follows the filter's settings at the time; a night's own choice stands in
     the table of selections, so another threshold extracts nothing anew.
     """
-    return Recipe(
-        EXTRACT,
-        {
-            "extraction": settings.extraction.model_dump(mode="json", exclude={"site_maps"}),
-            "site_maps": {site: one.digest for site, one in site_maps.items()},
-            "profiles": settings.ingest.model_dump(mode="json", include={"profiles"}),
-            "target_robot": settings_json(settings.target_robot),
-        },
-        inputs=(log.ref,),
-    )
+    asked: dict[str, JsonValue] = {
+        "extraction": settings.extraction.model_dump(mode="json", exclude={"site_maps"}),
+        "site_maps": {site: one.digest for site, one in site_maps.items()},
+        "profiles": settings.ingest.model_dump(mode="json", include={"profiles"}),
+        "target_robot": settings_json(settings.target_robot),
+    }
+    return {log: Recipe(EXTRACT, asked, inputs=(log.ref,)) for log in logs}
 
 
 @task(name="look for scenarios extracted before", cache_policy=NO_CACHE)
 def look_for_scenarios(
-    logs: Sequence[CatalogueEntry], *, store: LocalArtifactStore, settings: Settings
+    logs: Sequence[CatalogueEntry],
+    *,
+    store: LocalArtifactStore,
+    tables: TableLog,
+    settings: Settings,
 ) -> ExtractionState:
     """Divide the logs into those whose scenarios are in the tables and those still to do."""
-    shown = {part.ref for part in TableLog(store.layout).parts("scenarios")}
+    shown = {part.ref for part in tables.parts("scenarios")}
     site_maps = read_site_maps(settings.extraction.site_maps)
-    refs = {log: store.find(extraction_recipe(log, settings, site_maps)) for log in logs}
+    recipes = extraction_recipes(logs, settings, site_maps)
+    refs = {log: store.find(recipe) for log, recipe in recipes.items()}
     pending = tuple(log for log, ref in refs.items() if ref is None or ref not in shown)
     extracted = tuple(ref for ref in refs.values() if ref is not None and ref in shown)
     return conclude(
@@ -69,7 +71,12 @@ def look_for_scenarios(
 
 @task(name="extract scenarios", task_run_name="extract log {log.log_id:.12}", cache_policy=NO_CACHE)
 def extract_scenarios(
-    log: CatalogueEntry, *, store: LocalArtifactStore, settings: Settings, anew: bool = False
+    log: CatalogueEntry,
+    *,
+    store: LocalArtifactStore,
+    tables: TableLog,
+    settings: Settings,
+    anew: bool = False,
 ) -> Materialized:
     """Cut one log's trajectories into scenarios and rebuild each one's place."""
     site_maps = read_site_maps(settings.extraction.site_maps)
@@ -97,7 +104,8 @@ def extract_scenarios(
             filter_settings=settings.filter,
         )
 
-    made = materialize(store, extraction_recipe(log, settings, site_maps), build, anew=anew)
+    recipe = extraction_recipes([log], settings, site_maps)[log]
+    made = materialize(store, recipe, build, anew=anew)
     parts = artifact_parts(store, made.ref, name=log.log_id, batch_date=log.batch_date)
-    TableLog(store.layout).commit(parts, message=f"scenarios of log {log.log_id}")
+    tables.commit(parts, message=f"scenarios of log {log.log_id}")
     return conclude(made)

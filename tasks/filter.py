@@ -15,6 +15,7 @@ from storage.batch_rows import read_batch_rows
 from storage.materialize import Materialized, materialize
 from storage.selection_files import write_selection
 from storage.stages import FILTER
+from storage.table_log import TableLog
 from tasks.outcome import conclude
 
 
@@ -24,6 +25,7 @@ def select_scenarios(
     *,
     last_batch: date,
     store: LocalArtifactStore,
+    tables: TableLog,
     settings: FilterSettings,
     anew: bool = False,
 ) -> Materialized:
@@ -35,7 +37,7 @@ def select_scenarios(
     )
 
     def build(directory: Path) -> None:
-        rows = read_batch_rows(store, newest=last_batch)
+        rows = read_batch_rows(store, tables, newest=last_batch)
         logs = rows.logs
         selection = select_challenging(
             rows.scenarios,
@@ -44,6 +46,7 @@ def select_scenarios(
             last_batch=last_batch,
             map_logs=frozenset(logs.loc[logs["pose_source"] == "map", "log_id"]),
         )
-        write_selection(directory, selection, rows.environments)
+        chosen = {*selection.pool["environment_id"], *selection.heldout["environment_id"]}
+        write_selection(directory, selection, rows.whole_environments(chosen))
 
     return conclude(materialize(store, recipe, build, anew=anew))

@@ -14,6 +14,7 @@ from storage.inbox_ledger import InboxLedger
 from storage.ingestion import TakenIn, take_in, take_in_again
 from storage.log_decoder import DECODER_VERSION
 from storage.quarantine import Quarantine, QuarantinedLog
+from storage.table_log import TableLog
 from tasks.outcome import conclude
 
 
@@ -36,11 +37,19 @@ def ingest_log(
     *,
     batch_date: date,
     store: LocalArtifactStore,
+    tables: TableLog,
     settings: IngestSettings,
     anew: bool = False,
 ) -> TakenIn:
     """Decode one log in its limited child process and keep it, or refuse it with a reason."""
-    taken = take_in(candidate, batch_date=batch_date, store=store, settings=settings, anew=anew)
+    taken = take_in(
+        candidate,
+        batch_date=batch_date,
+        store=store,
+        tables=tables,
+        settings=settings,
+        anew=anew,
+    )
     get_run_logger().info("log %.12s: %s %s", taken.log_id, taken.status, taken.reason)
     return conclude(taken)
 
@@ -57,7 +66,10 @@ def retry_log(
     *,
     batch_date: date,
     store: LocalArtifactStore,
+    tables: TableLog,
     settings: IngestSettings,
 ) -> TakenIn:
     """Decode a log from quarantine once more; it stays there if it is refused again."""
-    return conclude(take_in_again(refused, batch_date=batch_date, store=store, settings=settings))
+    return conclude(
+        take_in_again(refused, batch_date=batch_date, store=store, tables=tables, settings=settings)
+    )

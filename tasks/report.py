@@ -22,7 +22,7 @@ PAGE = "index.html"
 
 @task(name="write the report", cache_policy=NO_CACHE)
 def report_night(
-    night: NightArtifacts, *, store: LocalArtifactStore, anew: bool = False
+    night: NightArtifacts, *, store: LocalArtifactStore, tables: TableLog, anew: bool = False
 ) -> Materialized:
     """Add the night to the tables, and put its page where people look for it."""
 
@@ -36,7 +36,7 @@ def report_night(
     made = materialize(store, Recipe(REPORT, night.key()), build, anew=anew)
     if night.selection is not None:
         parts = artifact_parts(store, made.ref, name=night.run_id, batch_date=night.batch_date)
-        TableLog(store.layout).commit(parts, message=f"night {night.run_id}")
+        tables.commit(parts, message=f"night {night.run_id}")
     page = (store.path(made.ref) / PAGE).read_bytes()
     replace_file(store.layout.report_page(night.batch_date), page)
     return conclude(made)

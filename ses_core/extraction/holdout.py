@@ -47,7 +47,7 @@ def hold_out(scenarios: pd.DataFrame, *, share: float, map_logs: Collection[str]
         share: Of the sites or places, held out.
         map_logs: Logs whose poses are in the frame of a map.
     """
-    sites = scenarios["site"].astype(str)
+    sites = scenarios["site"].astype(object)
     if sites.nunique() >= 2:
         basis: Basis = "site"
         starts, goals = sites, sites

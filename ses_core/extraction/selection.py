@@ -43,6 +43,18 @@ POOL_COLUMNS: Final = (
     "batch_date",
 )
 
+_COLUMNS: Final = (
+    "scenario_id",
+    "environment_id",
+    "log_id",
+    "robot",
+    "site",
+    "batch_date",
+    "kind",
+    "side",
+)
+"""What is chosen by, beside the counts: fewer columns are sorted and copied faster."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilterFunnel:
@@ -128,6 +140,7 @@ def select_challenging(
     rows = scenarios.assign(side=holdout.sides)[
         (dates >= since) & (dates <= last_batch.isoformat())
     ]
+    rows = rows[[*_COLUMNS, *COUNT_COLUMNS.values()]]
     rows = rows.assign(reason=_rejections(rows, environments, settings))
     kinds: tuple[CountKind, ...] = tuple(dict.fromkeys((*PRINTED_KINDS, settings.count_kind)))
     choices = {kind: _choose(rows, kind, settings) for kind in kinds}
@@ -202,6 +215,7 @@ def _rejections(
     """Say why the place of each row cannot be used; empty where it can."""
     places = environments[environments["scenario_id"] != ""]
     places = places.drop_duplicates("environment_id").set_index("environment_id")
+    positions = places.index.get_indexer(rows["environment_id"])
     found = places.reindex(rows["environment_id"])
     contradicted, observed, path_in_free = (
         found[column].to_numpy(dtype=np.float64, na_value=np.nan)
@@ -209,7 +223,7 @@ def _rejections(
     )
     reasons = np.select(
         [
-            ~rows["environment_id"].isin(places.index).to_numpy(dtype=np.bool_),
+            positions < 0,
             # Unknown for places from a map, where there is nothing to contradict.
             contradicted > settings.max_contradicted_fraction,
             ~(observed >= settings.min_observed_fraction),

@@ -29,8 +29,9 @@ def fill_store(root: Path, inbox: Path) -> LocalArtifactStore:
         settings=settings.ingest,
         progress=lambda _: None,
     )
+    tables = TableLog(store.layout)
     for candidate in scan.new:
-        take_in(candidate, batch_date=DAY, store=store, settings=settings.ingest)
-    for log in catalogue(TableLog(store.layout)):
-        extract_scenarios.fn(log, store=store, settings=settings)
+        take_in(candidate, batch_date=DAY, store=store, tables=tables, settings=settings.ingest)
+    for log in catalogue(tables):
+        extract_scenarios.fn(log, store=store, tables=tables, settings=settings)
     return store

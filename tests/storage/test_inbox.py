@@ -213,6 +213,19 @@ def refused(inbox: Path, tmp_path: Path) -> RefusedClaimError:
     return error.value
 
 
+def test_a_link_to_a_folder_is_passed_over(inbox: Path, tmp_path: Path) -> None:
+    put(tmp_path / "elsewhere" / "a.bag")
+    (inbox / "r1").symlink_to(tmp_path / "elsewhere")
+    put(inbox / ".hidden" / "b.bag")
+    found = scan(inbox)
+    assert (found.new, found.ignored_count) == ((), 1)
+
+
+def test_an_inbox_that_is_not_there_is_named(inbox: Path) -> None:
+    with pytest.raises(ArtifactError, match="inbox .*missing cannot be read"):
+        scan(inbox / "missing")
+
+
 def test_a_symbolic_link_is_refused_and_never_followed(inbox: Path, tmp_path: Path) -> None:
     secret = put(tmp_path / "secret.bag")
     (inbox / "a.bag").symlink_to(secret)

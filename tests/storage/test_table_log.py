@@ -1,4 +1,5 @@
 import multiprocessing
+from concurrent.futures import ThreadPoolExecutor
 from datetime import date
 from pathlib import Path
 
@@ -147,6 +148,31 @@ def test_an_artifact_without_tables_has_no_parts(store: LocalArtifactStore) -> N
     ref = store.put(Recipe(TRAIN), build)
     with pytest.raises(ArtifactError, match="no file named after a table"):
         artifact_parts(store, ref, name="a", batch_date=date(2026, 1, 1))
+
+
+def test_a_log_that_stays_open_sees_what_others_commit(store: LocalArtifactStore) -> None:
+    log = TableLog(store.layout)
+    commit_sample(store, log, "a", tables=("logs",))
+    commit_sample(store, TableLog(store.layout), "b", tables=("logs",))
+    assert [part.name for part in log.parts("logs")] == ["a", "b"]
+    commit_sample(store, log, "c", tables=("logs",))
+    assert len(log_ids(store)) == 9
+
+
+def test_threads_that_share_a_log_lose_no_commit(store: LocalArtifactStore) -> None:
+    log = TableLog(store.layout)
+
+    def write(writer: int) -> None:
+        for number in range(COMMITS):
+            commit_sample(store, log, f"w{writer}n{number}", tables=("selections",))
+            assert log.parts("selections")
+
+    with ThreadPoolExecutor(WRITERS) as threads:
+        list(threads.map(write, range(WRITERS)))
+    names = {f"w{w}n{n}" for w in range(WRITERS) for n in range(COMMITS)}
+    assert {part.name for part in TableLog(store.layout).parts("selections")} == names
+    assert len(list(store.layout.table_log.glob("*.json"))) == WRITERS * COMMITS
+    assert len(pd.read_parquet(store.layout.table_folder("selections"))) == 3 * len(names)
 
 
 def _commit_many(root: Path, writer: int) -> None:
