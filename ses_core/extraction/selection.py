@@ -215,7 +215,7 @@ def _rejections(
     """Say why the place of each row cannot be used; empty where it can."""
     places = environments[environments["scenario_id"] != ""]
     places = places.drop_duplicates("environment_id").set_index("environment_id")
-    positions = places.index.get_indexer(rows["environment_id"])
+    positions = places.index.get_indexer(pd.Index(rows["environment_id"]))
     found = places.reindex(rows["environment_id"])
     contradicted, observed, path_in_free = (
         found[column].to_numpy(dtype=np.float64, na_value=np.nan)

@@ -222,7 +222,7 @@ def test_a_link_to_a_folder_is_passed_over(inbox: Path, tmp_path: Path) -> None:
 
 
 def test_an_inbox_that_is_not_there_is_named(inbox: Path) -> None:
-    with pytest.raises(ArtifactError, match="inbox .*missing cannot be read"):
+    with pytest.raises(ArtifactError, match=r"inbox .*missing cannot be read"):
         scan(inbox / "missing")
 
 
