@@ -16,10 +16,10 @@ from ses_core.simulation.state import Memory, Slot
 CONTROLLER_PATIENCE_S = 15.0
 PLANNER_PATIENCE_S = 5.0
 
-_ACCELERATION = 3.2
-_SLOWEST = 0.4
-_FASTEST = 1.0
-"""rotate_recovery's defaults [rad/s^2, rad/s]: it reads names the Jackal's files do not set."""
+_FASTEST = 1.57
+_TOLERANCE = 0.157
+"""max_vel_theta [rad/s] and yaw_goal_tolerance [rad]: rotate_recovery reads them once, with the
+acceleration limit and the slowest turn, from the Jackal's file for TrajectoryPlannerROS."""
 
 
 @compiled_in_place
@@ -31,15 +31,19 @@ def recover(slot: Slot, memory: Memory, number: int, robot: RobotModel, period: 
     """
     if slot.recovery_angle <= 0.0:
         without_control = (slot.tick - slot.control_tick) * period
-        without_plan = (slot.tick - slot.plan_tick) * period
+        # Only a failing controller makes move_base wait for a plan; until then the old one does.
+        without_plan = (slot.tick - max(slot.plan_tick, slot.control_tick)) * period
         if without_control <= CONTROLLER_PATIENCE_S and without_plan <= PLANNER_PATIENCE_S:
             return False
-        slot.recovery_angle = 2.0 * math.pi
+        slot.recovery_angle = 2.0 * math.pi - _TOLERANCE
     if _turn_hits(slot, memory, number, robot):
         slot.recovery_angle = 0.0
     else:
-        rate = math.sqrt(2.0 * _ACCELERATION * slot.recovery_angle)
-        slot.command_v, slot.command_w = 0.0, min(max(rate, _SLOWEST), _FASTEST)
+        rate = math.sqrt(2.0 * robot.turn_acceleration * (slot.recovery_angle + _TOLERANCE))
+        slot.command_v, slot.command_w = (
+            0.0,
+            min(max(rate, robot.min_in_place_vel_theta), min(_FASTEST, robot.max_turn_rate)),
+        )
         slot.recovery_angle -= abs(slot.w) * period
     if slot.recovery_angle <= 0.0:
         slot.recovery_angle = 0.0
@@ -50,8 +54,7 @@ def recover(slot: Slot, memory: Memory, number: int, robot: RobotModel, period: 
 
 @compiled_in_place
 def _turn_hits(slot: Slot, memory: Memory, number: int, robot: RobotModel) -> bool:
-    """Tell whether the padded outline would meet a lethal cell during the rest of the turn."""
-    cost = rollout_cost(
-        slot, memory, number, robot, 0.0, slot.recovery_angle / SIM_TIME_S, False, math.inf
-    )
+    """Tell whether the padded outline would meet a lethal cell up to where the turn began."""
+    rest = slot.recovery_angle + _TOLERANCE
+    cost = rollout_cost(slot, memory, number, robot, 0.0, rest / SIM_TIME_S, False, math.inf)
     return cost == HITS

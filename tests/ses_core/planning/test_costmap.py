@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import distance_transform_edt
 
 from ses_core.arrays import BoolArray
+from ses_core.geometry import Pose2D
 from ses_core.planning.costmap import (
     RESOLUTION_M,
     _note_change,
@@ -16,6 +17,7 @@ from ses_core.planning.costmap import (
     refresh_distances,
     work_in_scan,
 )
+from ses_core.robot_profile import LaserProfile, RobotProfile
 from ses_core.simulation.sensing import sense
 from tests.simulated import Kernel, course, get, hall, kernel, put, simulator
 
@@ -58,20 +60,24 @@ def test_nothing_is_inflated_beyond_a_radius_smaller_than_the_inscribed_one() ->
 @settings(deadline=None, max_examples=25)
 @given(
     st.lists(
-        st.lists(st.tuples(st.integers(20, 110), st.integers(20, 110)), max_size=12),
+        st.lists(st.tuples(st.integers(0, 120), st.integers(0, 120)), max_size=12),
         min_size=1,
         max_size=3,
-    )
+    ),
+    st.booleans(),
 )
 def test_distances_refreshed_change_by_change_are_exact(
-    changes: list[list[tuple[int, int]]],
+    changes: list[list[tuple[int, int]]], at_far_end: bool
 ) -> None:
     k = kernel(simulator(course(hall(length=7.0, width=6.0), goal=(6.0, 2.5))))
     width, height = int(get(k.slot, "map_width")), int(get(k.slot, "map_height"))
     k.memory.marks[:] = 0
     k.memory.distances[:] = 255
     for flips in changes:
-        for row, column in flips:
+        for near_row, near_column in flips:
+            # One scan changes 124 cells at most; either end of the map is among them.
+            row = height - 1 - near_row if at_far_end else near_row
+            column = width - 1 - near_column if at_far_end else near_column
             index = row * width + column
             k.memory.marks[index] ^= 1
             _note_change(k.slot, index)
@@ -158,3 +164,64 @@ def test_positions_outside_the_map_are_ignored() -> None:
     put(k.slot, x=-40.0)
     work_in_scan(k.slot, k.memory, k.memory.scans[0], k.robot, k.scratch.queue[0], False)
     assert get(k.slot, "changed_right") == -1
+
+
+_MOUNTED = RobotProfile(
+    name="mounted",
+    laser=LaserProfile(
+        beams=120,
+        angle_min_rad=-math.pi,
+        angle_max_rad=math.pi - 2.0 * math.pi / 120,
+        range_max_m=12.0,
+        mount_x_m=0.12,
+        mount_y_m=-0.07,
+        mount_yaw_rad=2.0,
+    ),
+)
+
+
+def _beam_ends(k: Kernel, reach: float) -> list[tuple[float, float, float, float, float]]:
+    """Origin, unit direction and range (cut at `reach`) of every beam in map cells."""
+    laser, yaw = _MOUNTED.laser, get(k.slot, "yaw")
+    turn = complex(math.cos(yaw), math.sin(yaw))
+    eye = complex(get(k.slot, "x"), get(k.slot, "y")) + turn * complex(
+        laser.mount_x_m, laser.mount_y_m
+    )
+    eye = (eye - complex(get(k.slot, "map_x"), get(k.slot, "map_y"))) / 0.05
+    angles = yaw + laser.mount_yaw_rad + np.linspace(-math.pi, math.pi, 121)[:-1]
+    return [
+        (eye.real, eye.imag, math.cos(angle), math.sin(angle), min(float(length), reach) / 0.05)
+        for angle, length in zip(angles, k.memory.scans[0], strict=True)
+        if math.isfinite(length)
+    ]
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000), st.floats(-math.pi, math.pi))
+def test_a_mounted_round_laser_marks_its_hits_and_clears_what_its_beams_step_through(
+    seed: int, yaw: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    cells = hall() | (rng.random((50, 90)) < 0.02)
+    cells[20:31, 35:46] = False
+    task = course(cells, start=Pose2D(4.05, 2.55, yaw))
+    k = kernel(simulator(task, profile=_MOUNTED))
+    width, height = int(get(k.slot, "map_width")), int(get(k.slot, "map_height"))
+    # Something else was marked before; the robot sees through some of it.
+    k.memory.marks[:] = rng.random(k.memory.marks.shape) < 0.05
+    nearest = distance_transform_edt(k.memory.marks[: width * height].reshape(height, width) == 0)
+    k.memory.distances[: width * height] = np.minimum(np.rint(nearest**2), 255).ravel()
+    marks = k.memory.marks[: width * height].reshape(height, width).astype(bool)
+    for x, y, along_x, along_y, length in _beam_ends(k, 3.0):
+        pace = max(abs(along_x), abs(along_y))
+        for step in range(int(length * pace) + 1):
+            row, column = int(y + step * along_y / pace), int(x + step * along_x / pace)
+            if 0 <= row < height and 0 <= column < width:
+                marks[row, column] = False
+    for x, y, along_x, along_y, length in _beam_ends(k, 3.0):
+        if length < 2.5 / 0.05:
+            marks[int(y + length * along_y), int(x + length * along_x)] = True
+    work_in_scan(k.slot, k.memory, k.memory.scans[0], k.robot, k.scratch.queue[0], False)
+    found = k.memory.marks[: width * height].reshape(height, width) > 0
+    # Rounding may put a point that lies on a cell's edge into its neighbour.
+    assert np.count_nonzero(found != marks) <= 2

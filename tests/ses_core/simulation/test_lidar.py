@@ -9,7 +9,10 @@ from hypothesis.extra.numpy import arrays
 from scipy.ndimage import distance_transform_cdt
 
 from ses_core.arrays import BoolArray
+from ses_core.geometry import Pose2D
+from ses_core.robot_profile import LaserProfile, RobotProfile
 from ses_core.simulation.lidar import cast, cast_scan, chessboard_clearance
+from tests.simulated import course, hall, simulator
 
 grids = arrays(np.bool_, st.tuples(st.integers(1, 14), st.integers(1, 14)))
 
@@ -66,6 +69,42 @@ def test_a_ray_meets_the_same_face_as_a_walk_from_face_to_face(
     # Where a ray all but touches a corner the two may take either side of it.
     near_by = [_walk(occupied, x, y, angle + turn) for turn in (-1e-9, 0.0, 1e-9)]
     assert min(abs(distance - walked) for walked in near_by) < 1e-6
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.integers(0, 1000),
+    st.floats(-math.pi, math.pi),
+    st.floats(-0.3, 0.3),
+    st.floats(-0.3, 0.3),
+    st.floats(-math.pi, math.pi),
+)
+def test_a_round_laser_sees_from_where_it_is_mounted(
+    seed: int, yaw: float, mount_x: float, mount_y: float, mount_yaw: float
+) -> None:
+    cells = hall() | (np.random.default_rng(seed).random((50, 90)) < 0.02)
+    cells[20:31, 35:46] = False
+    laser = LaserProfile(
+        beams=90,
+        angle_min_rad=-math.pi,
+        angle_max_rad=math.pi - 2.0 * math.pi / 90,
+        range_max_m=3.0,
+        mount_x_m=mount_x,
+        mount_y_m=mount_y,
+        mount_yaw_rad=mount_yaw,
+    )
+    task = course(cells, start=Pose2D(4.05, 2.55, yaw))
+    ranges = simulator(task, profile=RobotProfile(name="round", laser=laser)).scans()[0]
+    eye_x = 4.05 + mount_x * math.cos(yaw) - mount_y * math.sin(yaw)
+    eye_y = 2.55 + mount_x * math.sin(yaw) + mount_y * math.cos(yaw)
+    for beam, found in enumerate(ranges):
+        angle = yaw + mount_yaw - math.pi + beam * 2.0 * math.pi / 90
+        walked = [
+            0.1 * _walk(cells, eye_x / 0.1, eye_y / 0.1, angle + turn)
+            for turn in (-1e-7, 0.0, 1e-7)
+        ]
+        expected = [length if 0.1 <= length <= 3.0 else math.inf for length in walked]
+        assert any(math.isclose(found, length, abs_tol=1e-4) for length in expected)
 
 
 def test_readings_outside_the_sensor_s_limits_are_no_returns() -> None:
