@@ -5,23 +5,22 @@ batch against PyBullet, beside batch against batch with another noise seed: no s
 agree better with another than with itself.
 """
 
-import os
-import tarfile
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 from _open_loop import open_loop_errors
+from _shared_worlds import barn_worlds, drawn_tasks, houses
 
 from ses_core.evaluation.episodes import Episode
 from ses_core.evaluation.fidelity import Fidelity, fidelity
 from ses_core.evaluation.trials import EvaluationTask, evaluate, evaluation_task
 from ses_core.learning.policies import FIXED_POLICIES, FixedParameters
+from ses_core.navigation import NavigationTask
 from ses_core.planning.parameters import PlannerParameters
 from ses_core.protocols import Policy
 from ses_core.robot_profile import JACKAL
 from ses_core.settings import SimulationSettings
-from ses_core.worlds.pairs import sample_tasks
-from storage.world_sets import read_worlds
 
 POLICIES: dict[str, Policy] = {
     **FIXED_POLICIES,
@@ -36,13 +35,18 @@ PAIRS_PER_HOUSE = 4
 SEED = 2026
 
 
-def measure(scratch: Path, *, barn: int = 50, houses: int = 10) -> list[dict[str, str | float]]:
+def measure(
+    scratch: Path, *, barn: int = 50, house_count: int = 10
+) -> list[dict[str, str | float]]:
     """Give open-loop errors and closed-loop agreement as rows."""
     rows = [
         _row(f"open loop, {kind}: p90 after 2 s", "m", float(np.quantile(found, 0.9)), 0.05)
         for kind, found in _open_loop().items()
     ]
-    places = _barn_places(scratch, barn) + _house_places(houses)
+    courses = barn_worlds(scratch, list(BARN_TEST_WORLDS)[:barn])
+    tasks = drawn_tasks(courses, 1, seed=SEED)
+    tasks += drawn_tasks(houses("tuning")[:house_count], PAIRS_PER_HOUSE, seed=SEED)
+    places = _places(tasks)
     sides = {
         name: _drive(places, seed=seed, simulator=simulator)
         for name, seed, simulator in (
@@ -110,33 +114,12 @@ def _drive(places: list[EvaluationTask], *, seed: int, simulator: str) -> list[E
     )
 
 
-def _shared(*parts: str) -> Path:
-    """Give a path below the shared data: `$SES_SHARED_DATA`, else beside the checkout."""
-    beside = Path(__file__).parents[2] / "shared" / "data"
-    path = Path(os.environ.get("SES_SHARED_DATA", beside)).joinpath(*parts)
-    if not path.exists():
-        raise SystemExit(f"{path} is missing, expected the shared data: set SES_SHARED_DATA")
-    return path
-
-
-def _barn_places(scratch: Path, count: int) -> list[EvaluationTask]:
-    with tarfile.open(_shared("barn", "BARN_300_worlds_and_paths.tar.xz")) as archive:
-        archive.extractall(scratch / "barn", filter="data")
-    files = {file.name: file for file in (scratch / "barn").rglob("*.world")}
-    chosen = [files[f"world_{number}.world"] for number in list(BARN_TEST_WORLDS)[:count]]
-    rng = np.random.default_rng(SEED)
-    return [
-        evaluation_task(task, pair=0, profile=JACKAL)
-        for world in read_worlds(chosen)
-        for task in sample_tasks(world, 1, profile=JACKAL, rng=rng)
-    ]
-
-
-def _house_places(count: int) -> list[EvaluationTask]:
-    houses = read_worlds([_shared("matterport")], part="tuning", resolution=0.03)[:count]
-    rng = np.random.default_rng(SEED)
-    return [
-        evaluation_task(task, pair=pair, profile=JACKAL)
-        for world in houses
-        for pair, task in enumerate(sample_tasks(world, PAIRS_PER_HOUSE, profile=JACKAL, rng=rng))
-    ]
+def _places(tasks: list[NavigationTask]) -> list[EvaluationTask]:
+    """Number the pairs of each world from 0."""
+    drawn: Counter[str] = Counter()
+    places = []
+    for task in tasks:
+        world = task.world.world_id
+        places.append(evaluation_task(task, pair=drawn[world], profile=JACKAL))
+        drawn[world] += 1
+    return places
