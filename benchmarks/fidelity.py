@@ -2,7 +2,7 @@
 
 Open loop: the same commands for two seconds. Closed loop: the same trials under four policies,
 batch against PyBullet, beside batch against batch with another noise seed: no simulator can
-agree better with another than with itself.
+agree better with another than with itself. Also draws `docs/fidelity.png`.
 """
 
 from collections import Counter
@@ -17,6 +17,7 @@ from ses_core.evaluation.fidelity import Fidelity, fidelity
 from ses_core.evaluation.trials import EvaluationTask, evaluate, evaluation_task
 from ses_core.learning.policies import FIXED_POLICIES, FixedParameters
 from ses_core.navigation import NavigationTask
+from ses_core.pictures.fidelity_figure import fidelity_figure
 from ses_core.planning.parameters import PlannerParameters
 from ses_core.protocols import Policy
 from ses_core.robot_profile import JACKAL
@@ -33,15 +34,18 @@ POLICIES: dict[str, Policy] = {
 BARN_TEST_WORLDS = range(0, 300, 6)
 PAIRS_PER_HOUSE = 4
 SEED = 2026
+FIGURE = Path(__file__).parents[1] / "docs" / "fidelity.png"
 
 
 def measure(
     scratch: Path, *, barn: int = 50, house_count: int = 10
 ) -> list[dict[str, str | float]]:
     """Give open-loop errors and closed-loop agreement as rows."""
+    errors = open_loop_errors(JACKAL)
+    pooled = {**errors, "all": np.concatenate(list(errors.values()))}
     rows = [
         _row(f"open loop, {kind}: p90 after 2 s", "m", float(np.quantile(found, 0.9)), 0.05)
-        for kind, found in _open_loop().items()
+        for kind, found in pooled.items()
     ]
     courses = barn_worlds(scratch, list(BARN_TEST_WORLDS)[:barn])
     tasks = drawn_tasks(courses, 1, seed=SEED)
@@ -55,17 +59,13 @@ def measure(
             ("again", SEED + 1, "batch"),
         )
     }
+    FIGURE.write_bytes(fidelity_figure(errors, sides["batch"], sides["bullet"]))
     physical = fidelity(sides["batch"], sides["bullet"])
     ceiling = fidelity(sides["batch"], sides["again"])
     rows += _closed_loop_rows(physical, ceiling)
     for name in POLICIES:
         rows.append(_success_row(name, sides["bullet"], sides["batch"]))
     return rows
-
-
-def _open_loop() -> dict[str, np.ndarray]:
-    errors = open_loop_errors(JACKAL)
-    return {**errors, "all": np.concatenate(list(errors.values()))}
 
 
 def _closed_loop_rows(physical: Fidelity, ceiling: Fidelity) -> list[dict[str, str | float]]:
