@@ -65,7 +65,12 @@ def measure(
     for setup in _bullet_setups():
         rows.append(_row(f"houses, {setup.name}", _drives(setup, few)))
     courses = drawn_tasks(barn_worlds(scratch, range(barn)), 1, seed=SEED)
-    for setup in _both("BARN", REAL):
+    unscaled = _with_planner("occdist_scale", 0.005)
+    for setup in (
+        *_both("BARN", REAL),
+        Setup(name="BARN, occdist_scale 0.005, slow", profile=unscaled),
+        Setup(name="BARN, occdist_scale 0.005, fast", profile=unscaled, parameters=DWA_FAST),
+    ):
         rows.append(_row(setup.name, _drives(setup, courses)))
     return rows
 
@@ -80,6 +85,11 @@ def _both(
     ]
 
 
+def _with_planner(key: str, value: float) -> RobotProfile:
+    planner = JACKAL.planner.model_copy(update={key: value})
+    return JACKAL.model_copy(update={"planner": planner})
+
+
 def _house_setups() -> Iterator[Setup]:
     for preset in ("real", "clean", "half", "double"):
         yield from _both(preset, SimulationSettings(imperfections=preset))
@@ -91,11 +101,7 @@ def _house_setups() -> Iterator[Setup]:
             profile=JACKAL.model_copy(update={"footprint_padding_m": padding}),
         )
     for key, value in (("occdist_scale", 0.005), ("min_vel_x", 0.0)):
-        planner = JACKAL.planner.model_copy(update={key: value})
-        yield Setup(
-            name=f"real, {key} {value}, slow",
-            profile=JACKAL.model_copy(update={"planner": planner}),
-        )
+        yield Setup(name=f"real, {key} {value}, slow", profile=_with_planner(key, value))
     for radius in (0.1, 0.5):
         yield Setup(
             name=f"real, inflation {radius} m, slow",
