@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from prefect.settings import PREFECT_FLOWS_HEARTBEAT_FREQUENCY, temporary_settings
 
 from flows.nightly_batch import extract_only, ingest_only
 from ses_core.extraction.recording import CommandStream, PoseStream, ScanStream
@@ -17,18 +18,26 @@ from ses_core.settings import IngestSettings, Settings
 from storage.rosbag_writer import BagContent, write_rosbag
 
 OLD_LOGS = 200
-REPETITIONS = 3
+REPETITIONS = 5
 TODAY = dt.date(2026, 1, 2)
 SETTINGS = Settings(ingest=IngestSettings(steady_s=0.0))
 
 
 def measure(scratch: Path) -> list[dict[str, str | float]]:
-    """Take one log into a store of 200 and into an empty one, three times each, by turns.
+    """Take one log into a store of 200 and into an empty one, five times each, by turns.
 
     The old logs are of an earlier day, as they are in a store that is used every night. The
     first new log after them also puts their rows together, which later ones find done: it has
     a row of its own.
+
+    Prefect's heartbeat is off here: it sleeps in whole seconds, and a flow that ends waits for it,
+    which would round what both sides take up to seconds.
     """
+    with temporary_settings({PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None}):
+        return _measure(scratch)
+
+
+def _measure(scratch: Path) -> list[dict[str, str | float]]:
     full, inbox = scratch / "full", scratch / "inbox"
     for number in range(OLD_LOGS):
         write_drive(inbox, f"old-{number:03d}", seed=number)
@@ -47,8 +56,8 @@ def measure(scratch: Path) -> list[dict[str, str | float]]:
         ),
         _row(
             f"one new log beside {OLD_LOGS} old ones, against an empty store",
-            statistics.median(ours),
-            statistics.median(theirs),
+            statistics.median(ours[1:]),
+            statistics.median(theirs[1:]),
         ),
     ]
 
