@@ -1,6 +1,7 @@
 """Gazebo `.world` files, BARN's among them: their solids as seen from above."""
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -24,7 +25,11 @@ from storage.world_files import MOST_CELLS, read_text
 
 GAZEBO_SUFFIXES = frozenset({".world", ".sdf"})
 
+FLOOR_PREFIX, START_MODEL, GOAL_MODEL = "floor_", "start", "goal"
+"""Models of our own worlds: see `storage.gazebo_world_writer`, which writes them."""
+
 _RESOLUTION_M = 0.05
+_FLOOR_NAME = re.compile(FLOOR_PREFIX + r"(\d{1,8})x(\d{1,8})")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +48,8 @@ def read_gazebo_world(path: Path) -> World:
     """Read the cylinders and boxes of a Gazebo world as seen from above.
 
     Models are read where they are described, not again in `<state>`. A world on BARN's lattice
-    becomes BARN's course: its cells, start and goal, and open ground up to the goal.
+    becomes BARN's course: its cells, start and goal, and open ground up to the goal. A world of
+    our own writing gives back the very cells it was written from.
 
     Raises:
         WorldError: It is no SDF, declares entities, or has no cylinder or box.
@@ -58,6 +64,9 @@ def read_gazebo_world(path: Path) -> World:
     if world is None:
         raise WorldError(f"{path} has no <world>, expected SDF")
     shapes = [shape for model in world.findall("model") for shape in _shapes(model, path)]
+    if (floor := _declared_floor(world, path)) is not None:
+        grid = _rasterise(shapes, floor.cells.shape, floor.resolution, floor.origin, margin=0.0)
+        return named_world(path.stem, grid, source="sdf", course=_declared_course(world, path))
     if not shapes:
         raise WorldError(f"{path} has no cylinder or box, expected at least one obstacle")
     centres = np.array([(shape.pose.x, shape.pose.y) for shape in shapes])
@@ -78,6 +87,43 @@ def read_gazebo_world(path: Path) -> World:
         margin=_RESOLUTION_M / 2,
     )
     return named_world(path.stem, grid, source="sdf")
+
+
+def _declared_floor(world: ET.Element, path: Path) -> OccupancyGrid | None:
+    """Give the empty grid that a world of our own writing states, None for any other."""
+    for model in world.findall("model"):
+        named = _FLOOR_NAME.fullmatch(model.get("name", ""))
+        size = model.findtext("link/visual/geometry/box/size")
+        if named is None or size is None:
+            continue
+        width, height = int(named[1]), int(named[2])
+        length_m, width_m, _ = _numbers(size, 3, path)
+        if not 0 < width * height <= MOST_CELLS:
+            raise WorldError(
+                f"{path} has a floor of {width} x {height} cells, expected 1 to {MOST_CELLS}"
+            )
+        resolution = length_m / width
+        if resolution <= 0.0 or abs(width_m - height * resolution) > 1e-6 * abs(width_m):
+            raise WorldError(
+                f"{path} has a floor of {length_m} x {width_m} m for {width} x {height} cells, "
+                "expected square cells"
+            )
+        corner = _pose(model, path)
+        return OccupancyGrid(
+            cells=np.zeros((height, width), dtype=np.bool_),
+            resolution=resolution,
+            origin=(corner.x, corner.y),
+        )
+    return None
+
+
+def _declared_course(world: ET.Element, path: Path) -> tuple[Pose2D, tuple[float, float]] | None:
+    """Give the start and goal that a world of our own writing states, if any."""
+    marks = {model.get("name"): model for model in world.findall("model")}
+    if START_MODEL not in marks or GOAL_MODEL not in marks:
+        return None
+    goal = _pose(marks[GOAL_MODEL], path)
+    return _pose(marks[START_MODEL], path), (goal.x, goal.y)
 
 
 def _is_barn(shapes: list[_Shape], centres: FloatArray) -> bool:

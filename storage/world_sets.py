@@ -15,6 +15,7 @@ from ses_core.errors import SchemaError, WorldError
 from ses_core.geometry import Pose2D
 from ses_core.navigation import World
 from ses_core.occupancy import OccupancyGrid
+from storage.array_worlds import ARRAY_SUFFIX, read_array_world
 from storage.durable_files import replace_file, sync_file, sync_folder, temporary_name
 from storage.gazebo_worlds import GAZEBO_SUFFIXES, read_gazebo_world
 from storage.world_files import IMAGE_SUFFIXES, MAP_SUFFIXES, read_image, read_map_server
@@ -143,7 +144,8 @@ def _world_files(path: Path, *, part: str | None, passed_over: list[Path]) -> It
         is_picture = suffix in IMAGE_SUFFIXES
         if file.name == SPLIT_FILE or (is_picture and file.stem in described):
             continue
-        if not (is_picture or suffix in MAP_SUFFIXES or suffix in GAZEBO_SUFFIXES):
+        is_world = suffix in GAZEBO_SUFFIXES or suffix == ARRAY_SUFFIX
+        if not (is_picture or is_world or suffix in MAP_SUFFIXES):
             passed_over.append(file)
         elif chosen is None or file.stem in chosen:
             yield file
@@ -178,11 +180,13 @@ def _read_file(file: Path, resolution: float | None) -> list[World]:
         return [read_map_server(file)]
     if suffix in GAZEBO_SUFFIXES:
         return [read_gazebo_world(file)]
+    if suffix == ARRAY_SUFFIX:
+        return [read_array_world(file)]
     if suffix in IMAGE_SUFFIXES:
         if resolution is None:
             raise WorldError(f"{file} carries no resolution, expected --resolution [m per pixel]")
         return [read_image(file, resolution=resolution)]
-    raise WorldError(f"{file} is no map, expected {WORLDS_FILE}, yaml, an image or .world")
+    raise WorldError(f"{file} is no map, expected {WORLDS_FILE}, yaml, an image, .world or .npz")
 
 
 def _read_world_set(file: Path) -> list[World]:
