@@ -1,6 +1,6 @@
 """Writing real bags, ROS 1 files and ROS 2 folders, for fleets that we simulate."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -8,6 +8,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from rosbags import rosbag1, rosbag2
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 
 from ses_core.arrays import FloatArray, IntArray
 from ses_core.extraction.recording import CommandStream, PoseStream, RecordedMap, ScanStream
@@ -27,7 +35,26 @@ from storage.message_types import ros1_types, ros2_types
 BagFormat = Literal["mcap", "db3", "bag"]
 BagCompression = Literal["none", "file", "message", "storage", "lz4", "bz2"]
 
-_ODOM_FRAME, _BASE_FRAME, _LASER_FRAME, _MAP_FRAME = "odom", "base_link", "laser", "map"
+MAP_FRAME = "map"
+_ODOM_FRAME, _BASE_FRAME, _LASER_FRAME = "odom", "base_link", "laser"
+
+_LATCHED_TOPICS = frozenset({"/tf_static", "/map", "/path", "/markers"})
+"""Published once: whoever plays the bag back must keep them for those who listen later."""
+
+_FOREVER = QosTime(9223372036, 854775807)
+_LATCHED = (
+    Qos(
+        history=QosHistory.KEEP_LAST,
+        depth=1,
+        reliability=QosReliability.RELIABLE,
+        durability=QosDurability.TRANSIENT_LOCAL,
+        deadline=_FOREVER,
+        lifespan=_FOREVER,
+        liveliness=QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=_FOREVER,
+        avoid_ros_namespace_conventions=False,
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +81,7 @@ class BagContent:
 
 
 @dataclass(frozen=True, slots=True)
-class _Stream:
+class MessageStream:
     """One topic's messages: serialized rows (K,) at stamps (K,) [ns]."""
 
     topic: str
@@ -79,12 +106,12 @@ def write_rosbag(
         compression: `file`, `message`, `storage` (MCAP chunks) for ROS 2; `lz4`, `bz2` for ROS 1.
     """
     if format == "bag":
-        _write_ros1(path, list(_streams(content, "ros1")), compression)
+        _write_ros1(path, list(message_streams(content, "ros1")), compression)
     else:
-        _write_ros2(path, list(_streams(content, "cdr")), format, compression)
+        write_ros2(path, list(message_streams(content, "cdr")), format, compression)
 
 
-def _write_ros1(path: Path, streams: list[_Stream], compression: BagCompression) -> None:
+def _write_ros1(path: Path, streams: Sequence[MessageStream], compression: BagCompression) -> None:
     writer = rosbag1.Writer(path)
     if compression != "none":
         writer.set_compression(rosbag1.Writer.CompressionFormat[compression.upper()])
@@ -97,9 +124,10 @@ def _write_ros1(path: Path, streams: list[_Stream], compression: BagCompression)
             writer.write(connections[topic], stamp, message)
 
 
-def _write_ros2(
-    path: Path, streams: list[_Stream], storage: BagFormat, compression: BagCompression
+def write_ros2(
+    path: Path, streams: Sequence[MessageStream], storage: BagFormat, compression: BagCompression
 ) -> None:
+    """Write streams of CDR messages as a ROS 2 bag: a folder that must not exist."""
     plugin = rosbag2.StoragePlugin.MCAP if storage == "mcap" else rosbag2.StoragePlugin.SQLITE3
     writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
     if compression != "none":
@@ -107,19 +135,24 @@ def _write_ros2(
         writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
     with writer:
         connections = {
-            topic: writer.add_connection(topic, message_type, typestore=ros2_types())
+            topic: writer.add_connection(
+                topic,
+                message_type,
+                typestore=ros2_types(),
+                offered_qos_profiles=_LATCHED if topic in _LATCHED_TOPICS else (),
+            )
             for topic, message_type in _topics(streams).items()
         }
         for topic, stamp, message in _in_time_order(streams):
             writer.write(connections[topic], stamp, message)
 
 
-def _topics(streams: list[_Stream]) -> dict[str, str]:
+def _topics(streams: Sequence[MessageStream]) -> dict[str, str]:
     """Give each topic's message type; several streams may share one topic."""
     return {stream.topic: stream.message_type for stream in streams}
 
 
-def _in_time_order(streams: list[_Stream]) -> Iterator[tuple[str, int, bytes]]:
+def _in_time_order(streams: Sequence[MessageStream]) -> Iterator[tuple[str, int, bytes]]:
     """Give (topic, stamp [ns], message) in order of time, earlier streams first when tied."""
     stamps = np.concatenate([stream.stamps_ns for stream in streams])
     owners = np.repeat(np.arange(len(streams)), [len(stream.stamps_ns) for stream in streams])
@@ -129,36 +162,47 @@ def _in_time_order(streams: list[_Stream]) -> Iterator[tuple[str, int, bytes]]:
         yield stream.topic, int(stamps[index]), stream.rows[rows[index]].tobytes()
 
 
-def _streams(content: BagContent, serialization: Serialization) -> Iterator[_Stream]:
+def message_streams(content: BagContent, serialization: Serialization) -> Iterator[MessageStream]:
+    """Serialize everything a bag says, topic by topic."""
     start = content.poses.stamps_ns[:1]
     if content.scans is not None:
         mount = content.scans.mount
         rows = _transform_rows(serialization, start, _pose_array(mount), _BASE_FRAME, _LASER_FRAME)
-        yield _Stream("/tf_static", TRANSFORMS, start, rows)
+        yield MessageStream("/tf_static", TRANSFORMS, start, rows)
     if content.map is not None:
-        yield _Stream("/map", OCCUPANCY_GRID, start, _map_rows(serialization, start, content.map))
+        yield map_stream(content.map, stamp_ns=int(start[0]), serialization=serialization)
     if content.map_to_odom is not None:
         stamps = content.poses.stamps_ns
         poses = np.repeat(_pose_array(content.map_to_odom), len(stamps), axis=0)
-        rows = _transform_rows(serialization, stamps, poses, _MAP_FRAME, _ODOM_FRAME)
-        yield _Stream("/tf", TRANSFORMS, stamps, rows)
+        rows = _transform_rows(serialization, stamps, poses, MAP_FRAME, _ODOM_FRAME)
+        yield MessageStream("/tf", TRANSFORMS, stamps, rows)
     rows = _transform_rows(
         serialization, content.poses.stamps_ns, content.poses.poses, _ODOM_FRAME, _BASE_FRAME
     )
-    yield _Stream("/tf", TRANSFORMS, content.poses.stamps_ns, rows)
-    yield _Stream(
+    yield MessageStream("/tf", TRANSFORMS, content.poses.stamps_ns, rows)
+    yield MessageStream(
         "/odom", ODOMETRY, content.poses.stamps_ns, _odometry_rows(serialization, content.poses)
     )
     if content.commands is not None:
         stamps, commands = content.commands.stamps_ns, content.commands.commands
-        yield _Stream("/cmd_vel", TWIST, stamps, _twist_rows(serialization, commands))
+        yield MessageStream("/cmd_vel", TWIST, stamps, _twist_rows(serialization, commands))
     if content.scans is not None:
         rows = _scan_rows(serialization, content.scans)
-        yield _Stream("/scan", LASER_SCAN, content.scans.stamps_ns, rows)
+        yield MessageStream("/scan", LASER_SCAN, content.scans.stamps_ns, rows)
     if content.goals is not None and content.goal_stamps_ns is not None:
         topic = "/move_base_simple/goal" if serialization == "ros1" else "/goal_pose"
         stamps = content.goal_stamps_ns
-        yield _Stream(topic, POSE_STAMPED, stamps, _goal_rows(serialization, stamps, content.goals))
+        yield MessageStream(
+            topic, POSE_STAMPED, stamps, _goal_rows(serialization, stamps, content.goals)
+        )
+
+
+def map_stream(
+    recorded: RecordedMap, *, stamp_ns: int, serialization: Serialization
+) -> MessageStream:
+    """Serialize a map, published once, in the frame `map`."""
+    stamps = np.array([stamp_ns], dtype=np.int64)
+    return MessageStream("/map", OCCUPANCY_GRID, stamps, _map_rows(serialization, stamps, recorded))
 
 
 def _odometry_rows(serialization: Serialization, stream: PoseStream) -> NDArray[np.void]:
@@ -240,7 +284,7 @@ def _map_rows(
 ) -> NDArray[np.void]:
     height, width = recorded.cells.shape
     layout = LayoutBuilder(serialization)
-    layout.add_header(_MAP_FRAME)
+    layout.add_header(MAP_FRAME)
     layout.add("load_sec", "u4")
     layout.add("load_nanosec", "u4")
     layout.add_constant("resolution", "f4", recorded.resolution)
