@@ -131,9 +131,9 @@ def test_both_libraries_read_every_topic(written: Path) -> None:
     assert len(summary.chunk_indexes) == summary.statistics.chunk_count >= 1
     assert summary.statistics.message_count == sum(map(len, by_mcap.values()))
     assert set(by_mcap) == set(TOPICS)
-    with AnyReader([written]) as reader:
+    with AnyReader([written]) as bag:
         by_rosbags: dict[str, list[tuple[int, bytes]]] = {}
-        for connection, stamp, raw in reader.messages():
+        for connection, stamp, raw in bag.messages():
             by_rosbags.setdefault(connection.topic, []).append((stamp, bytes(raw)))
     assert by_rosbags == by_mcap
 
