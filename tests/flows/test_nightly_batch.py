@@ -142,7 +142,7 @@ def test_the_pages_galleries_hold_every_place_of_the_night(
         for data in re.findall(r'<script type="application/json">(.*?)</script>', page)
     )
     scenarios = tables["scenarios"].set_index("environment_id")
-    whole = scenarios[(scenarios.kind == "scenario") & scenarios.index.notna()]
+    whole = scenarios[(scenarios.kind == "scenario") & pd.notna(scenarios.index)]
     assert sorted(recorded["id"]) == sorted(whole.index)
     selected = tables["selections"][tables["selections"].run_id == first["run_id"]]
     chosen = selected.sort_values("rank").environment_id.to_list()

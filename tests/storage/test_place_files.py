@@ -5,6 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
+import pybullet
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -183,6 +184,23 @@ def test_a_gazebo_world_needs_nothing_but_itself_and_few_boxes(tmp_path: Path) -
     assert len(models["walls"].findall("link/visual")) == 3
     for mark in ("floor_30x30", "start", "goal"):
         assert not list(models[mark].iter("collision"))
+
+
+def test_another_reader_of_gazebo_worlds_meets_the_same_walls(tmp_path: Path) -> None:
+    place = place_of_environment(environment(noise(1)))
+    write_place(tmp_path / "a.sdf", place, format="sdf")
+    rows, columns = np.indices(place.grid.cells.shape)
+    centres = cell_centres(place.grid, np.column_stack((columns.ravel(), rows.ravel())))
+    above, below = (np.insert(centres, 2, z, axis=1).tolist() for z in (2.0, -0.5))
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        pybullet.loadSDF(str(tmp_path / "a.sdf"), physicsClientId=client)
+        pybullet.performCollisionDetection(physicsClientId=client)
+        met = pybullet.rayTestBatch(above, below, physicsClientId=client)
+    finally:
+        pybullet.disconnect(client)
+    is_wall = np.array([height > 0.5 for _, _, _, (_, _, height), _ in met])
+    assert np.array_equal(is_wall.reshape(place.grid.cells.shape), place.grid.cells)
 
 
 def test_a_hostile_name_stays_text(tmp_path: Path) -> None:
