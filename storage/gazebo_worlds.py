@@ -43,6 +43,14 @@ class _Shape:
     def reach(self) -> float:
         return self.radius or math.hypot(*self.half_sizes)
 
+    def extents(self) -> tuple[float, float]:
+        """Give how far it gets from its centre along x and y [m]."""
+        if self.radius:
+            return self.radius, self.radius
+        cosine, sine = abs(math.cos(self.pose.yaw)), abs(math.sin(self.pose.yaw))
+        half_x, half_y = self.half_sizes
+        return cosine * half_x + sine * half_y, sine * half_x + cosine * half_y
+
 
 def read_gazebo_world(path: Path) -> World:
     """Read the cylinders and boxes of a Gazebo world as seen from above.
@@ -148,12 +156,13 @@ def _rasterise(
     """Mark every cell whose centre lies in a shape grown by a margin [m]."""
     cells = np.zeros(shape_of_grid, dtype=np.bool_)
     for shape in shapes:
-        reach = shape.reach() + resolution
+        # A long wall's window is as narrow as the wall: worlds of thousands stay quick to read.
+        reach_x, reach_y = (extent + margin + resolution for extent in shape.extents())
         low_x, low_y, high_x, high_y = (
-            max(0, math.floor((shape.pose.x - reach - origin[0]) / resolution)),
-            max(0, math.floor((shape.pose.y - reach - origin[1]) / resolution)),
-            math.ceil((shape.pose.x + reach - origin[0]) / resolution),
-            math.ceil((shape.pose.y + reach - origin[1]) / resolution),
+            max(0, math.floor((shape.pose.x - reach_x - origin[0]) / resolution)),
+            max(0, math.floor((shape.pose.y - reach_y - origin[1]) / resolution)),
+            math.ceil((shape.pose.x + reach_x - origin[0]) / resolution),
+            math.ceil((shape.pose.y + reach_y - origin[1]) / resolution),
         )
         window = cells[low_y:high_y, low_x:high_x]
         rows, columns = np.indices(window.shape)
