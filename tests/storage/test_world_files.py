@@ -11,6 +11,7 @@ from storage.world_files import read_image, read_map_server
 from tests.shared_data import shared_data
 
 FREE, WALL, UNKNOWN = 254, 0, 205
+MAP = "image: floor.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n"
 
 
 def _picture() -> ByteArray:
@@ -57,10 +58,13 @@ def test_a_negated_map_reads_dark_as_free(tmp_path: Path) -> None:
     [
         ("image: floor.pgm\norigin: [0, 0, 0]\n", "resolution: field required"),
         ("image: floor.pgm\nresolution: -1\norigin: [0, 0, 0]\n", "greater than 0"),
-        ("image: gone.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n", "cannot be read as an image"),
-        ("- a\n- b\n", "content: input should be"),
+        ("image: gone.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n", "names the image gone.pgm"),
+        (MAP + "occupied_thresh: 0.1\n", "free_thresh should be less"),
+        (MAP + "mode: shaded\n", "mode: input should be"),
+        ("image: floor.pgm\nresolution: 1\norigin: [0, .nan, 0]\n", "three finite numbers"),
+        ("- a\n- b\n", "expected the keys image"),
         ("{", "is no YAML"),
-        ("a: &a [*a]\n", "image: field required"),
+        ("a: &a [*a]\n", "expected the keys image"),
         ("[" * 2000, "is no YAML"),
     ],
 )
@@ -101,7 +105,7 @@ def test_a_fine_plan_is_coarsened_without_losing_a_thin_wall(tmp_path: Path) -> 
 def test_an_image_without_free_ground_or_that_is_none_is_refused(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((5, 5), dtype=np.uint8)).save(tmp_path / "dark.png")
     (tmp_path / "fake.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
-    with pytest.raises(WorldError, match="no free cell"):
+    with pytest.raises(WorldError, match="no cell is free"):
         read_image(tmp_path / "dark.png", resolution=0.1)
     with pytest.raises(WorldError, match="cannot be read as an image"):
         read_image(tmp_path / "fake.png", resolution=0.1)
