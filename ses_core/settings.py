@@ -260,8 +260,8 @@ class EvaluationSettings(SettingsModel):
     min_distance_m: float = Field(6.6, gt=0, description="Least straight start-goal distance.")
     pair_preset: Literal["default", "long"] = Field(
         "default",
-        description="'long': start and goal also at least half the world's diagonal apart, which "
-        "gives several scenarios a drive.",
+        description="'long': start and goal also nearly as far apart as any two places of the "
+        "world, which gives several scenarios a drive.",
     )
     seed: int = Field(0, ge=0, description="Seed of pairs and trials; the same for all policies.")
     simulator: Literal["batch", "bullet"] = Field("batch", description="Where it is measured.")

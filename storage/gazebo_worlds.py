@@ -34,8 +34,8 @@ RESOLUTION_M = 0.05
 _UPRIGHT_RAD = 0.05
 """Worlds saved from a running simulation lean by less."""
 
-_STATE = re.compile(r"<state(?:\s[^>]*)?(?<!/)>.*?</state\s*>", re.DOTALL)
-"""Gazebo repeats every model in the state it saved: half of the file, and nothing for us."""
+_NEEDLESS = re.compile(r"<(state|visual|inertial)(?:\s[^>]*)?(?<!/)>.*?</\1\s*>", re.DOTALL)
+"""Gazebo repeats every model in the state it saved: most of a file is nothing for us to parse."""
 
 _SCENERY = frozenset({"ground_plane", "sun"})
 """Models included everywhere that nobody bumps into."""
@@ -96,7 +96,7 @@ def read_gazebo_world(
     if "<!DOCTYPE" in text:
         raise WorldError(f"{path} declares a document type, expected plain SDF without entities")
     try:
-        world = ET.fromstring(_STATE.sub("", text)).find("world")
+        world = ET.fromstring(_NEEDLESS.sub("", text)).find("world")
     except ET.ParseError as error:
         raise WorldError(f"{path} is no XML: {error}") from error
     if world is None:
