@@ -16,8 +16,9 @@ from ses_core.geometry import Pose2D
 from ses_core.navigation import World
 from ses_core.occupancy import OccupancyGrid
 from ses_core.place import Place
+from ses_core.worlds.grids import MOST_CELLS
 from ses_core.worlds.identity import named_world
-from storage.world_files import MOST_CELLS, first_line
+from storage.world_files import first_line
 
 ARRAY_SUFFIX = ".npz"
 

@@ -14,7 +14,7 @@ from ses_core.geometry import Pose2D
 from ses_core.occupancy import OccupancyGrid
 from ses_core.place import Place
 from ses_core.simulation.rendering import WALL_HEIGHT_M, merge_boxes
-from storage.gazebo_worlds import FLOOR_PREFIX, GOAL_MODEL, START_MODEL
+from storage.gazebo_marks import FLOOR_PREFIX, GOAL_MODEL, START_MODEL
 
 _GROUND_SIDE_M = 200.0
 _MARK_M = 0.002

@@ -45,7 +45,7 @@ def assemble_recording(
             poses, used_source = in_map, "map"
     commands = _commands(streams, profile)
     scans = assemble_scans(streams, profile, base)
-    recorded_map = _map(streams)
+    recorded_map = assemble_map(streams)
     dropped = sum(count for name, count in warnings.items() if name.startswith("dropped_"))
     return Recording(
         poses=poses,
@@ -220,7 +220,8 @@ def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream
     return CommandStream(stamps_ns=stamps[last], commands=clean[last])
 
 
-def _map(streams: CollectedStreams) -> RecordedMap | None:
+def assemble_map(streams: CollectedStreams) -> RecordedMap | None:
+    """Give the map among the streams; None where there is none that can be used."""
     grid = streams.map
     if grid is None:
         return None

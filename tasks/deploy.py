@@ -19,7 +19,7 @@ from ses_core.settings import Settings
 from ses_core.worlds.deployment import Deployment, deploy
 from ses_core.worlds.homes import generate_homes
 from ses_core.worlds.identity import content_digest
-from ses_core.worlds.pairs import sample_tasks
+from ses_core.worlds.pairs import PairPreset, sample_tasks
 from storage.artifact_store import LocalArtifactStore
 from storage.deployment_logs import FleetFormat, write_deployments
 from storage.materialize import Materialized, materialize
@@ -57,6 +57,7 @@ def fleet_tasks(
     min_distance: float,
     profile: RobotProfile,
     seed: int,
+    preset: PairPreset = "default",
 ) -> list[NavigationTask]:
     """Spread deployments evenly over worlds, world by world.
 
@@ -69,6 +70,7 @@ def fleet_tasks(
             -(-count // len(worlds)),
             profile=profile,
             min_distance=min_distance,
+            preset=preset,
             rng=np.random.default_rng([seed, int(content_digest(world.grid)[:8], 16)]),
         )
         for world in worlds
@@ -102,6 +104,7 @@ def deploy_fleet(
         found,
         deployments,
         min_distance=settings.evaluation.min_distance_m,
+        preset=settings.evaluation.pair_preset,
         profile=settings.target_robot,
         seed=seed,
     )

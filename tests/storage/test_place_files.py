@@ -97,7 +97,7 @@ def test_any_environment_comes_back_from_map_server(
     write_place(folder / NAMES["map-server"], place, format="map-server")
     blocked = place.grid.cells | ~place.observed
     if blocked.all():
-        with pytest.raises(WorldError, match="no free cell"):
+        with pytest.raises(WorldError, match="no cell is free"):
             read_map_server(folder / NAMES["map-server"])
         return
     world = read_map_server(folder / NAMES["map-server"])
