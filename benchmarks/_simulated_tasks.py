@@ -4,19 +4,16 @@ import itertools
 
 import numpy as np
 
-from ses_core.arrays import BoolArray
 from ses_core.geometry import Pose2D
 from ses_core.navigation import NavigationTask, World
-from ses_core.occupancy import ENVIRONMENT_SIDE_M, OccupancyGrid, environment_course
+from ses_core.occupancy import ENVIRONMENT_SIDE_M, environment_course
 from ses_core.robot_profile import RobotProfile
 from ses_core.worlds.cellular_automata import generate_barn_world
-from ses_core.worlds.homes import RESOLUTION_M, WALL_M, generate_home
+from ses_core.worlds.homes import generate_home
 from ses_core.worlds.pairs import sample_tasks
 
 HOUSE_M = (30.0, 40.0)
-"""Depth and length of a house [m]: several homes from our generator, their corridors open."""
-
-_ALLEY_CELLS = 30  # between the homes of a house: 1.5 m
+"""Ground a house is built on [m]: height and length."""
 
 
 def barn_tasks(count: int, *, seed: int) -> list[NavigationTask]:
@@ -51,37 +48,6 @@ def house_tasks(
         task
         for index in range(houses)
         for task in sample_tasks(
-            _house(seed=1000 * seed + index), per_house, profile=profile, rng=rng
+            generate_home(index, seed=seed, sides_m=HOUSE_M), per_house, profile=profile, rng=rng
         )
     ]
-
-
-def _house(*, seed: int) -> World:
-    """Set homes in rows on the ground of a house, doors at both ends of every corridor."""
-    depth, length = (round(side / RESOLUTION_M) for side in HOUSE_M)
-    cells = np.zeros((depth, length), dtype=np.bool_)
-    bottom = left = _ALLEY_CELLS
-    row_top = 0
-    for index in itertools.count():
-        home = _open_ends(generate_home(index, seed=seed).grid.cells)
-        if left + home.shape[1] > length - _ALLEY_CELLS:
-            bottom, left = row_top + _ALLEY_CELLS, _ALLEY_CELLS
-        if bottom + home.shape[0] > depth - _ALLEY_CELLS:
-            grid = OccupancyGrid(cells=cells, resolution=RESOLUTION_M)
-            return World(world_id=f"house-{seed}", grid=grid, source="home")
-        cells[bottom : bottom + home.shape[0], left : left + home.shape[1]] = home
-        row_top = max(row_top, bottom + home.shape[0])
-        left += home.shape[1] + _ALLEY_CELLS
-    raise AssertionError("unreachable: homes are endless")
-
-
-def _open_ends(home: BoolArray) -> BoolArray:
-    """Lay a home along its corridor and open the corridor at both ends."""
-    wall = round(WALL_M / RESOLUTION_M)
-    for cells in (home, home.T):
-        is_corridor = ~cells[:, wall:-wall].any(axis=1)
-        if is_corridor.any():
-            opened = cells.copy()
-            opened[is_corridor] = False
-            return opened
-    raise AssertionError("a home has a corridor without furniture")

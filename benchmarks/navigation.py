@@ -148,6 +148,11 @@ def _counts(
     )
 
 
+def measured_row(setup: Setup, tasks: Sequence[NavigationTask]) -> dict[str, str | float]:
+    """Drive a setup through tasks and give its row."""
+    return _row(setup.name, _drives(setup, tasks))
+
+
 def _row(name: str, drives: Sequence[Drive]) -> dict[str, str | float]:
     outcomes = np.array([drive.outcome for drive in drives])
     reached = outcomes == EpisodeOutcome.SUCCESS

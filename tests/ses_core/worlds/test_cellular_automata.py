@@ -1,3 +1,5 @@
+from collections import Counter
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -13,7 +15,7 @@ from ses_core.worlds.cellular_automata import (
     generate_barn,
     generate_barn_world,
     grow_field,
-    smooth_path,
+    parameter_set,
 )
 
 
@@ -59,9 +61,14 @@ def test_seeds_and_indices_give_different_worlds() -> None:
     assert len({generated.world.world_id for generated in worlds}) == 4
 
 
-def test_the_twelve_parameter_sets_follow_each_other() -> None:
+def test_every_dozen_has_all_parameter_sets_and_so_have_the_held_out_worlds() -> None:
+    dozens = [{parameter_set(index) for index in range(12 * k, 12 * k + 12)} for k in range(25)]
+    assert all(dozen == set(PARAMETER_SETS) for dozen in dozens)
+    held_out = Counter(parameter_set(index) for index in range(0, 300, 6))
+    assert set(held_out) == set(PARAMETER_SETS)
+    assert max(held_out.values()) - min(held_out.values()) <= 1
     generated = generate_barn_world(14, seed=0)
-    assert (generated.fill, generated.smoothing) == PARAMETER_SETS[2]
+    assert (generated.fill, generated.smoothing) == parameter_set(14)
 
 
 @pytest.mark.parametrize("index", range(6))
@@ -90,18 +97,26 @@ def test_a_field_with_a_wall_across_cannot_be_crossed() -> None:
     assert cross_field(field, rng=np.random.default_rng(0)) is None
 
 
-def test_a_path_turns_by_at_most_45_degrees_per_cell() -> None:
-    blocked = np.ones((30, 30), dtype=np.bool_)
-    blocked[5, :10] = blocked[7, :10] = False
-    # One cell joins the two lanes: whoever turns back in it turns by 90 degrees at once.
-    blocked[6, 10] = False
-    assert smooth_path(blocked, (5, 0), (7, 0)) is None
-    # A room at the end of the lanes is wide enough to turn in steps of 45 degrees.
-    blocked[5:9, 10:13] = False
-    path = smooth_path(blocked, (5, 0), (7, 0))
+def test_a_field_open_by_a_diagonal_step_alone_cannot_be_crossed() -> None:
+    field = np.zeros((30, 30), dtype=np.bool_)
+    field[[0, -1]] = True
+    # The robot's configuration space of these two walls meets at one corner.
+    field[1:16, 12] = True
+    field[20:29, 17] = True
+    assert cross_field(field, rng=np.random.default_rng(0)) is None
+    field[15, 12] = False
+    assert cross_field(field, rng=np.random.default_rng(0)) is not None
+
+
+def test_the_largest_region_is_crossed_not_the_one_with_the_widest_mouth() -> None:
+    field = np.zeros((30, 30), dtype=np.bool_)
+    field[[0, -1]] = True
+    # A bay with a wide mouth above, a narrower but larger lane below.
+    field[20] = True
+    field[1:20, 8:] = True
+    path = cross_field(field, rng=np.random.default_rng(0))
     assert path is not None
-    assert path[0].tolist() == [5, 0]
-    assert path[-1].tolist() == [7, 0]
+    assert path[:, 0].min() > 20
 
 
 def test_a_course_is_a_walled_corridor_a_field_and_open_ground() -> None:
