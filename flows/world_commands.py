@@ -29,7 +29,7 @@ def generate(
     out: OutOption,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="World i of a seed is fixed.")] = 0,
 ) -> None:
-    """Generate a world set: BARN's cellular automaton, or homes of rooms and doors."""
+    """Generate a world set: BARN's cellular automaton, or furnished homes."""
     from storage.world_sets import write_world_set
 
     if kind == "barn":

@@ -41,7 +41,7 @@ LIVING_RADII_M = (0.6, 1.3)
 COVERED_SHARES = (0.45, 0.75)
 """Share of a room's floor under furniture."""
 
-LIVING_SHARES = (0.2, 0.5)
+LIVING_COVERED_SHARES = (0.2, 0.5)
 """The same in the living area."""
 
 FUSED_CELLS = (1, 4)
@@ -49,6 +49,9 @@ FUSED_CELLS = (1, 4)
 
 FARTHEST_PLACES_M = 9.0
 """A home has places so far apart that a Jackal gets between."""
+
+LEAST_SIDES_M = (6.0, 12.0)
+"""Smallest ground: on less, homes with such places are rare or impossible."""
 
 _TRIES = 8
 _TURNED_SHARE = 0.3
@@ -63,7 +66,16 @@ def generate_homes(
 
 
 def generate_home(index: int, *, seed: int, sides_m: tuple[float, float] | None = None) -> World:
-    """Generate one home, on a ground of given height and length [m] or one of usual size."""
+    """Generate one home, on a ground of given height and length [m] or one of usual size.
+
+    Raises:
+        ValueError: The ground is too small.
+    """
+    if sides_m is not None and (min(sides_m) < LEAST_SIDES_M[0] or max(sides_m) < LEAST_SIDES_M[1]):
+        raise ValueError(
+            f"home has {sides_m[0]:g} x {sides_m[1]:g} m of ground, "
+            f"expected at least {LEAST_SIDES_M[0]:g} x {LEAST_SIDES_M[1]:g} m"
+        )
     rng = np.random.default_rng([seed, index])
     while True:
         layout = lay_out(sides_m or _draw_sides(rng), rng=rng)
@@ -112,7 +124,7 @@ def _furnish(cells: BoolArray, room: Room, *, rng: Generator) -> None:
     radius = rng.uniform(*(LIVING_RADII_M if room.is_living else PASSAGE_RADII_M))
     radius = min(radius, (min(window.shape) // 2 - 1) * RESOLUTION_M)
     accesses = [_access(room, doorway, in_cells(radius) + 1) for doorway in room.doorways]
-    most = rng.uniform(*(LIVING_SHARES if room.is_living else COVERED_SHARES)) * window.size
+    most = rng.uniform(*(LIVING_COVERED_SHARES if room.is_living else COVERED_SHARES)) * window.size
     for piece in furniture_for(room.area_m2, is_corridor=room.is_corridor, rng=rng):
         for _ in range(_TRIES):
             if window.sum() >= most:
