@@ -29,7 +29,7 @@ WALLS_M = (0.15, 0.45)
 ROOM_AREAS_M2 = (7.0, 45.0)
 LEAST_ROOM_SIDE_M = 2.0
 
-LIVING_SHARES = (0.15, 0.4)
+LIVING_SHARES = (0.1, 0.33)
 """Share of the floor that is one area of rooms open to each other."""
 
 SHUT_SHARES = (0.2, 0.55)

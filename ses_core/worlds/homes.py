@@ -27,7 +27,7 @@ from ses_core.worlds.home_layout import (
 from ses_core.worlds.identity import named_world
 from ses_core.worlds.pairs import standing_places
 
-MEDIAN_LENGTH_M = 22.5
+MEDIAN_LENGTH_M = 21.0
 LENGTHS_M = (12.0, 38.0)
 _LENGTH_SPREAD = 0.35
 _HEIGHT_SHARES = (0.5, 0.85)
