@@ -24,6 +24,7 @@ from _two_samples import (
     linear_separation,
 )
 from navigation import Setup, measured_row
+from scipy.stats import spearmanr
 
 from ses_core.arrays import FloatArray
 from ses_core.navigation import World
@@ -57,7 +58,7 @@ def measure(scratch: Path, *, barn: int = 300, seeds: int = 3, homes: int = 50) 
 
 def _barn_rows(scratch: Path, count: int, seeds: int) -> list[Row]:
     originals, textures = _originals(scratch, count)
-    rows = []
+    rows = _order_rows(originals)
     for seed in range(seeds):
         generated = generate_barn(count, seed=seed)
         points = np.array([barn_measures(each.field, each.path) for each in generated])
@@ -70,6 +71,18 @@ def _barn_rows(scratch: Path, count: int, seeds: int) -> list[Row]:
         textures[::2],
         textures[1::2],
     )
+
+
+def _order_rows(originals: FloatArray) -> list[Row]:
+    """Give how measures of the originals go with their numbers: Spearman's correlation."""
+    numbers = np.arange(len(originals))
+    return [
+        {
+            "name": f"BARN, originals' numbers: {name}",
+            "rho": _shown(spearmanr(numbers, originals[:, column]).statistic),
+        }
+        for column, name in enumerate(MEASURES)
+    ]
 
 
 def _originals(scratch: Path, count: int) -> tuple[FloatArray, FloatArray]:
