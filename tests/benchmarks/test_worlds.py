@@ -37,9 +37,9 @@ HOUSES_10_90 = {
     "mean clearance [m]": (0.26, 0.54),
     "width 50 % [m]": (0.57, 1.01),
     "width 90 % [m]": (1.32, 2.68),
-    "path clearance [m]": (0.51, 0.98),
-    "bottleneck [m]": (0.89, 1.36),
-    "path over straight": (1.04, 1.17),
+    "path clearance [m]": (0.53, 0.87),
+    "bottleneck [m]": (0.93, 1.42),
+    "path over straight": (1.04, 1.24),
 }
 
 
