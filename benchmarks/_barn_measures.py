@@ -58,12 +58,11 @@ def barn_measures(field: BoolArray, path: IntArray) -> FloatArray:
     """Give `MEASURES` (9,) of a field (30, 30) and its path (K, 2), start named once."""
     blocked = ndimage.binary_dilation(field, structure=np.ones((5, 5), dtype=np.bool_))
     distance = ndimage.distance_transform_edt(~blocked)
-    around = [_look_around(blocked, int(row), int(column)) for row, column in path]
     steps = np.hypot(*np.diff(path, axis=0).T).sum()
     return np.array(
         (
             distance[path[:, 0], path[:, 1]].mean(),
-            *np.mean(around, axis=0),
+            *_look_around(blocked, path),
             steps / math.dist(path[0], path[-1]),
             steps,
             hollowed(field).mean(),
@@ -73,27 +72,36 @@ def barn_measures(field: BoolArray, path: IntArray) -> FloatArray:
     )
 
 
-def _look_around(blocked: BoolArray, row: int, column: int) -> tuple[float, float, float]:
-    """Visibility, dispersion and characteristic dimension of a free cell."""
-    runs = {ray: _free_run(blocked, row, column, ray, len(blocked)) for ray in _EIGHT}
-    seen = [length + 1 for length, ends_blocked in runs.values() if ends_blocked]
-    narrowest = min((runs[ray][0] + runs[-ray[0], -ray[1]][0]) * math.hypot(*ray) for ray in _AXES)
-    walls = [
-        _free_run(blocked, row, column, ray, 2 if 2 in ray else _DISPERSION_CELLS)[1]
-        for ray in _SIXTEEN
-    ]
-    changes = sum(wall != walls[index - 1] for index, wall in enumerate(walls))
-    return float(np.mean(seen)) if seen else 0.0, float(changes), narrowest
+def _look_around(blocked: BoolArray, path: IntArray) -> tuple[float, float, float]:
+    """Visibility, dispersion and characteristic dimension, averaged along a path (K, 2)."""
+    runs = {ray: _free_runs(blocked, path, ray, len(blocked)) for ray in _EIGHT}
+    lengths = np.array([length for length, _ in runs.values()])
+    is_seen = np.array([ends_blocked for _, ends_blocked in runs.values()])
+    seen = np.where(is_seen, lengths + 1, 0).sum(axis=0) / is_seen.sum(axis=0).clip(min=1)
+    widths = [(runs[ray][0] + runs[-ray[0], -ray[1]][0]) * math.hypot(*ray) for ray in _AXES]
+    walls = np.array(
+        [
+            _free_runs(blocked, path, ray, 2 if 2 in ray else _DISPERSION_CELLS)[1]
+            for ray in _SIXTEEN
+        ]
+    )
+    changes = (walls != np.roll(walls, 1, axis=0)).sum(axis=0)
+    return float(seen.mean()), float(changes.mean()), float(np.min(widths, axis=0).mean())
 
 
-def _free_run(
-    blocked: BoolArray, row: int, column: int, ray: tuple[int, int], most: int
-) -> tuple[int, bool]:
-    """Count the free cells along a ray, and tell if a blocked one ends it within `most` steps."""
+def _free_runs(
+    blocked: BoolArray, path: IntArray, ray: tuple[int, int], most: int
+) -> tuple[IntArray, BoolArray]:
+    """Count free cells along a ray (K,), and tell if a blocked one ends it within `most` steps."""
+    length = np.zeros(len(path), dtype=np.int64)
+    is_going = np.ones(len(path), dtype=np.bool_)
+    ends_blocked = np.zeros(len(path), dtype=np.bool_)
+    padded = np.pad(blocked, 1)
     for step in range(1, most + 1):
-        row, column = row + ray[0], column + ray[1]
-        if not (0 <= row < blocked.shape[0] and 0 <= column < blocked.shape[1]):
-            return step - 1, False
-        if blocked[row, column]:
-            return step - 1, True
-    return most, False
+        cells = path + step * np.array(ray)
+        is_going &= ((cells >= 0) & (cells < blocked.shape)).all(axis=1)
+        row, column = (np.where(is_going[:, None], cells, -1) + 1).T
+        ends_blocked |= padded[row, column]
+        is_going &= ~padded[row, column]
+        length += is_going
+    return length, ends_blocked

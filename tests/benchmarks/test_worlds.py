@@ -47,13 +47,13 @@ def test_generated_barn_worlds_measure_like_the_originals(monkeypatch: pytest.Mo
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     barn = runpy.run_path(str(BENCHMARKS / "_barn_measures.py"))
     points = np.array(
-        [barn["barn_measures"](each.field, each.path) for each in generate_barn(180, seed=0)]
+        [barn["barn_measures"](each.field, each.path) for each in generate_barn(96, seed=0)]
     )
     for name, quantiles in BARN_QUANTILES.items():
         values = points[:, barn["MEASURES"].index(name)]
         reached = [float((values <= quantile + 1e-3).mean()) for quantile in quantiles]
-        # 180 draws from the originals themselves stay within 0.1 in 99 of 100 cases.
-        assert reached == pytest.approx(SHARES, abs=0.1), name
+        # A share among 96 draws has a standard deviation of 0.05 at most.
+        assert reached == pytest.approx(SHARES, abs=0.12), name
 
 
 def test_barns_measures_of_a_field_that_can_be_measured_by_hand(
