@@ -26,6 +26,7 @@ def test_barns_own_fields_give_barns_own_paths(tmp_path: Path) -> None:
         blocked = ndimage.binary_dilation(field, structure=np.ones((5, 5), dtype=np.bool_))
         start, goal = (tuple(int(cell) for cell in end) for end in (published[0], published[-1]))
         found = search_path(blocked, (start[0], start[1]), (goal[0], goal[1]))
+        assert found is not None
         assert np.array_equal(found, published)
 
 
