@@ -1,6 +1,7 @@
 """From a bag's decoded messages to a clean `Recording`: poses, velocities, scans, mount and map."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from ses_core.extraction.stream_cleaning import (
 )
 from ses_core.geometry import Pose2D, wrap_angles
 from ses_core.robot_profile import RobotProfile
-from storage.collected_streams import BASE_FRAMES, CollectedStreams
-from storage.message_decoding import FramedTransform, Quaternion
+from storage.collected_streams import BASE_FRAMES, CollectedStreams, by_time
+from storage.message_decoding import Transforms
 from storage.scan_assembly import assemble_scans
 
 _UNIT_TOLERANCE = 1e-2
@@ -63,8 +64,10 @@ def assemble_recording(
 def _base_frame(streams: CollectedStreams, profile: RobotProfile) -> str:
     if profile.base_frame is not None:
         return profile.base_frame
-    named = Counter(odometry.child for _, odometry in streams.odometry if odometry.child)
-    if named:
+    named: Counter[str] = Counter()
+    for odometry in streams.odometry:
+        named[odometry.child] += len(odometry.stamps_ns) if odometry.child else 0
+    if named.total():
         return named.most_common(1)[0][0]
     frames = {frame for edge in streams.transforms for frame in edge}
     return next((frame for frame in BASE_FRAMES if frame in frames), BASE_FRAMES[0])
@@ -72,10 +75,12 @@ def _base_frame(streams: CollectedStreams, profile: RobotProfile) -> str:
 
 def _odometry(streams: CollectedStreams, profile: RobotProfile, base: str) -> PoseStream:
     if streams.odometry:
-        stamps = np.array([stamp for stamp, _ in streams.odometry], dtype=np.int64)
-        positions = np.array([message.position for _, message in streams.odometry])
-        turns = np.array([message.orientation for _, message in streams.odometry])
-        twists = np.array([message.twist for _, message in streams.odometry])
+        stamps, (positions, turns, twists) = by_time(
+            [block.stamps_ns for block in streams.odometry],
+            [block.positions for block in streams.odometry],
+            [block.orientations for block in streams.odometry],
+            [block.twists for block in streams.odometry],
+        )
         return _pose_stream(streams.warnings, profile, stamps, positions, turns, twists)
     edge = next(
         (
@@ -88,11 +93,8 @@ def _odometry(streams: CollectedStreams, profile: RobotProfile, base: str) -> Po
     if edge is None:
         raise LogError("missing_topic", "log has no odometry, and no transform from odom to base")
     streams.warnings["pose_from_transforms"] = 1
-    found = streams.transforms[edge]
-    stamps = np.array([stamp for stamp, _ in found], dtype=np.int64)
-    positions = np.array([transform.position for _, transform in found])
-    turns = np.array([transform.orientation for _, transform in found])
-    twists = np.full((len(found), 2), np.nan)
+    stamps, (positions, turns) = _transform_columns(streams.transforms[edge])
+    twists = np.full((len(stamps), 2), np.nan)
     # Transforms are counted as messages already: what is dropped here is only a pose.
     return _pose_stream(Counter(), profile, stamps, positions, turns, twists)
 
@@ -181,17 +183,26 @@ def _poses_in_map(streams: CollectedStreams, odometry: PoseStream, base: str) ->
     return PoseStream(stamps_ns=stamps, poses=poses, twists=twists)
 
 
-def _planar(found: list[tuple[int, FramedTransform]]) -> tuple[IntArray, FloatArray]:
+def _transform_columns(blocks: Sequence[Transforms]) -> tuple[IntArray, list[FloatArray]]:
+    """Give stamps, positions and quaternions of transforms in order of time."""
+    return by_time(
+        [block.stamps_ns for block in blocks],
+        [block.positions for block in blocks],
+        [block.orientations for block in blocks],
+    )
+
+
+def _planar(blocks: Sequence[Transforms]) -> tuple[IntArray, FloatArray]:
     """Give the usable stamps (K,) [ns] and poses (K, 3) of transforms, in order, none repeated."""
-    stamps = np.array([stamp for stamp, _ in found], dtype=np.int64)
-    positions = np.array([transform.position for _, transform in found]).reshape(-1, 3)
-    turns = np.array([transform.orientation for _, transform in found]).reshape(-1, 4)
+    if not blocks:
+        return np.empty(0, dtype=np.int64), np.empty((0, 3))
+    stamps, (positions, turns) = _transform_columns(blocks)
     yaws, _ = _yaws(turns)
     poses = np.column_stack((positions[:, :2], yaws))
-    order = np.argsort(stamps, kind="stable")
-    order = order[usable_poses(poses[order])]
-    order = order[first_of_each_stamp(stamps[order])]
-    return stamps[order], poses[order]
+    usable = usable_poses(poses)
+    stamps, poses = stamps[usable], poses[usable]
+    fresh = first_of_each_stamp(stamps)
+    return stamps[fresh], poses[fresh]
 
 
 def _compose_rows(outer: FloatArray, inner: FloatArray) -> FloatArray:
@@ -206,8 +217,10 @@ def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream
     if not streams.commands:
         return None
     warnings = streams.warnings
-    stamps = np.array([stamp for stamp, _ in streams.commands], dtype=np.int64)
-    commands = np.array([command for _, command in streams.commands])
+    stamps, (commands,) = by_time(
+        [block.stamps_ns for block in streams.commands],
+        [block.twists for block in streams.commands],
+    )
     if len(stamps) > 1:
         clock = clean_clock(stamps, warnings)
         warnings["dropped_bad_stamp"] += clock.dropped
@@ -232,13 +245,13 @@ def _map(streams: CollectedStreams) -> RecordedMap | None:
     cells: ByteArray = np.full(grid.data.shape, _FREE, dtype=np.uint8)
     cells[grid.data >= _OCCUPIED_PERCENT] = _OCCUPIED
     cells[grid.data < 0] = _UNKNOWN
-    origin = Pose2D(grid.position[0], grid.position[1], yaw)
+    origin = Pose2D(float(grid.position[0]), float(grid.position[1]), yaw)
     return RecordedMap(cells=cells, resolution=grid.resolution, origin=origin)
 
 
-def _yaw(orientation: Quaternion) -> float:
+def _yaw(orientation: FloatArray) -> float:
     """Give a heading [rad]; map servers often leave the quaternion at zero, which means none."""
-    if orientation == (0.0, 0.0, 0.0, 0.0):
+    if not orientation.any():
         return 0.0
-    yaws, _ = _yaws(np.array([orientation]))
+    yaws, _ = _yaws(orientation[None])
     return float(yaws[0])

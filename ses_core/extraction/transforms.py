@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +24,7 @@ class PlanarMount:
     is_upside_down: bool
 
 
-def transform_matrix(
-    position: tuple[float, float, float], orientation: tuple[float, float, float, float]
-) -> FloatArray | None:
+def transform_matrix(position: Sequence[float], orientation: Sequence[float]) -> FloatArray | None:
     """Give the (4, 4) matrix of a position [m] and quaternion (x, y, z, w); None if unusable."""
     x, y, z, w = orientation
     norm = math.sqrt(x * x + y * y + z * z + w * w) if _all_finite(orientation) else 0.0
