@@ -1,6 +1,7 @@
 """`ses worlds`: sets of worlds, and `ses deploy`: a simulated fleet's day in them."""
 
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -33,6 +34,10 @@ app.add_typer(worlds_app)
 SHEET_WORLDS = 36
 """Worlds on a contact sheet when nothing else is asked for."""
 
+DateOption = Annotated[
+    datetime | None,
+    typer.Option(formats=["%Y-%m-%d"], metavar="YYYY-MM-DD", help="Day it drove; else today."),
+]
 MapPaths = Annotated[
     list[Path],
     typer.Argument(
@@ -123,14 +128,58 @@ def deploy(
     ] = "mcap",
     part: PartOption = None,
     resolution: ResolutionOption = None,
+    min_distance: Annotated[
+        float | None, typer.Option(metavar="D", help="Least start-goal distance [m].")
+    ] = None,
+    pairs: Annotated[
+        Literal["default", "long"] | None,
+        typer.Option(help="Or at least half of the world's diagonal apart."),
+    ] = None,
+    robots: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Robots that take turns in a world.")
+    ] = None,
+    drives_per_log: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Drives in one log; 1, in tables 50.")
+    ] = None,
+    split_seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="MCAP and db3: a new file of the log after so long."),
+    ] = None,
+    publish_map: Annotated[
+        bool, typer.Option("--publish-map", help="Record the world as a map, too.")
+    ] = False,
+    odometry_drift: Annotated[
+        float | None,
+        typer.Option(metavar="D", help="Share by which ways and turns are off; 0.01 is real."),
+    ] = None,
+    date: DateOption = None,
     simulator: SimulatorOption = None,
     seed: SeedOption = None,
 ) -> None:
     """Let a simulated fleet drive for a day and write its logs as <site>/<robot>/."""
     from flows.prefect_server import embedded_server
+    from ses_core.imperfections import resolve
 
     command = command_context(context)
-    settings = command.settings(given({"evaluation.simulator": simulator}))
+    if split_seconds is not None and log_format not in ("mcap", "db3"):
+        raise typer.BadParameter(
+            f"found format {log_format}, expected mcap or db3", param_hint="--split-seconds"
+        )
+    options = given(
+        {
+            "evaluation.simulator": simulator,
+            "evaluation.min_distance_m": min_distance,
+            "fleet.pairs": pairs,
+            "fleet.robots_per_site": robots,
+            "fleet.drives_per_log": drives_per_log,
+            "fleet.split_s": split_seconds,
+            "fleet.publishes_map": publish_map or None,
+        }
+    )
+    if odometry_drift is not None:
+        levels = resolve(command.settings({}).simulation.imperfections).model_dump()
+        options["simulation.imperfections"] = {**levels, "odometry_drift": odometry_drift}
+    settings = command.settings(options)
     check_policies(command, [policy], "--policy")
     with embedded_server(command.root):
         from flows.fleet_deployment import deploy as deploy_flow
@@ -145,6 +194,7 @@ def deploy(
             out=out.absolute(),
             format=log_format,
             seed=seed or 0,
+            date=date.date() if date else None,
             settings=settings,
         )
     answer_facts(command, summary.model_dump(mode="json"))

@@ -55,18 +55,22 @@ def decode_request(request: Mapping[str, object], *, scratch: Path) -> dict[str,
     from ses_core.errors import LogError
     from ses_core.robot_profile import RobotProfile
     from ses_core.settings import DecoderLimits
-    from storage.log_formats import make_reader
-    from storage.recording_files import write_recording
+    from storage.log_formats import TABLES, make_reader
+    from storage.recording_files import write_recording, write_tabled_log
 
     limits = DecoderLimits.model_validate(request["limits"])
     profile = RobotProfile.model_validate(request["profile"])
-    output = Path(str(request["output"]))
-    reader = make_reader(str(request["format"]), limits=limits, workdir=scratch)
+    log, output = Path(str(request["log"])), Path(str(request["output"]))
     try:
-        recording = reader.read(
-            Path(str(request["log"])), profile=profile, pose_source=str(request["pose_source"])
-        )
-        write_recording(output, recording)
+        if request["format"] == TABLES:
+            # Arrow takes a moment to import, which a bag need not wait for.
+            from storage.tabled_logs import read_tabled_log
+
+            write_tabled_log(output, read_tabled_log(log, limits=limits))
+        else:
+            reader = make_reader(str(request["format"]), limits=limits, workdir=scratch)
+            pose_source = str(request["pose_source"])
+            write_recording(output, reader.read(log, profile=profile, pose_source=pose_source))
     except LogError as error:
         return {"reason": error.reason, "message": str(error)[:_MESSAGE_LIMIT]}
     except (MemoryError, RecursionError, OSError) as error:

@@ -11,16 +11,21 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 from ses_core.errors import ArtifactError, LogError
 from ses_core.extraction.recording import Recording
-from ses_core.recipes import settings_json
+from ses_core.extraction.tabled_drives import TabledLog
+from ses_core.recipes import JsonValue, settings_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import DecoderLimits
+from storage.log_formats import TABLES
 from storage.quarantine import REASONS
-from storage.recording_files import read_recording
+from storage.recording_files import read_recording, read_tabled_log_back
 
-DECODER_VERSION = 1
+Decoded = TypeVar("Decoded", covariant=True)
+
+DECODER_VERSION = 2
 """Raised whenever more logs, or the same logs better, are decoded: refused ones are tried again."""
 
 _OUTCOME_LIMIT = 2**16
@@ -32,6 +37,8 @@ _ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
+    # Arrow's own pool reserves a gigabyte of addresses at once.
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
 }
 
 
@@ -44,7 +51,7 @@ def decode_log(
     limits: DecoderLimits,
     workdir: Path,
 ) -> Recording:
-    """Decode a spooled log in a child process.
+    """Decode a spooled log in a child process; any but one of tables.
 
     Args:
         log: Named by us, never by whoever uploaded it.
@@ -58,6 +65,40 @@ def decode_log(
         LogError: The log cannot be used; the reason is from `storage.quarantine.REASONS`.
         ArtifactError: The machine failed, not the log.
     """
+    return _decode(
+        log,
+        {"format": format, "profile": settings_json(profile), "pose_source": pose_source},
+        limits=limits,
+        workdir=workdir,
+        read=read_recording,
+    )
+
+
+def decode_tables(
+    log: Path, *, profile: RobotProfile, limits: DecoderLimits, workdir: Path
+) -> TabledLog:
+    """Read a spooled folder of tables in a child process; see `decode_log`."""
+    return _decode(
+        log,
+        {"format": TABLES, "profile": settings_json(profile), "pose_source": ""},
+        limits=limits,
+        workdir=workdir,
+        read=read_tabled_log_back,
+    )
+
+
+class _ReadBack(Protocol[Decoded]):
+    def __call__(self, directory: Path, *, byte_limit: int) -> Decoded: ...
+
+
+def _decode(
+    log: Path,
+    asked: dict[str, JsonValue],
+    *,
+    limits: DecoderLimits,
+    workdir: Path,
+    read: "_ReadBack[Decoded]",
+) -> Decoded:
     size = _size(log)
     if size > limits.log_mib * 2**20:
         raise LogError("size_limit", f"log has {size} bytes, expected at most {limits.log_mib} MiB")
@@ -68,10 +109,8 @@ def decode_log(
         output.mkdir()
         scratch.mkdir()
         request = {
+            **asked,
             "log": str(log.absolute()),
-            "format": format,
-            "profile": settings_json(profile),
-            "pose_source": pose_source,
             "limits": settings_json(limits),
             "output": str(output.absolute()),
             "parent": os.getpid(),
@@ -81,7 +120,7 @@ def decode_log(
         reason, message = _outcome(home / "outcome.json")
         if reason:
             raise LogError(reason, message)
-        return read_recording(output, byte_limit=2 * limits.output_mib * 2**20)
+        return read(output, byte_limit=2 * limits.output_mib * 2**20)
 
 
 def _run(home: Path, scratch: Path, limits: DecoderLimits) -> None:

@@ -100,12 +100,29 @@ class Malformed:
 
 @dataclass(frozen=True, slots=True)
 class MessageBatch:
-    """Messages of one topic: log times (K,) [ns] and serialized contents."""
+    """Messages of one topic, those of one length together.
 
-    stamps_ns: IntArray
-    contents: Sequence[bytes | memoryview]
+    Attributes:
+        tables: (stamps (K,) [ns], rows (K, L)): log times, and serialized contents of L bytes.
+    """
+
+    tables: Sequence[tuple[IntArray, ByteArray]]
     is_ros1: bool
     malformed: Malformed = field(default_factory=Malformed)
+
+
+def batch_of(
+    stamps: IntArray, contents: Sequence[bytes | memoryview], *, is_ros1: bool
+) -> MessageBatch:
+    """Sort messages at stamps (K,) [ns] by length."""
+    lengths = np.array([len(content) for content in contents], dtype=np.int64)
+    tables = []
+    for length in np.unique(lengths).tolist():
+        alike = np.flatnonzero(lengths == length)
+        content = b"".join([contents[index] for index in alike.tolist()])
+        rows = np.frombuffer(content, dtype=np.uint8).reshape(len(alike), length)
+        tables.append((stamps[alike], rows))
+    return MessageBatch(tables, is_ros1)
 
 
 _Reader = Callable[[MessageForm], Callable[[ByteArray, IntArray], Any]]
@@ -145,12 +162,8 @@ def decode_grids(batch: MessageBatch) -> Iterator[Grid]:
 
 def _decode(batch: MessageBatch, read: _Reader) -> Iterator[Any]:
     """Sort messages by form and give each form's columns."""
-    lengths = np.array([len(content) for content in batch.contents], dtype=np.int64)
-    for length in np.unique(lengths):
-        alike = np.flatnonzero(lengths == length)
-        table = b"".join([batch.contents[index] for index in alike.tolist()])
-        rows = np.frombuffer(table, dtype=np.uint8).reshape(len(alike), int(length))
-        yield from _decode_rows(rows, batch.stamps_ns[alike], batch, read)
+    for stamps, rows in batch.tables:
+        yield from _decode_rows(rows, stamps, batch, read)
 
 
 def _decode_rows(

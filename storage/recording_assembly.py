@@ -14,7 +14,7 @@ from ses_core.extraction.stream_cleaning import (
     plausible_twists,
     usable_poses,
 )
-from ses_core.geometry import Pose2D, wrap_angles
+from ses_core.geometry import Pose2D, compose_rows
 from ses_core.robot_profile import RobotProfile
 from storage.collected_streams import BASE_FRAMES, CollectedStreams, by_time
 from storage.message_decoding import Transforms
@@ -24,6 +24,8 @@ _UNIT_TOLERANCE = 1e-2
 _SHORTEST_QUATERNION = 0.1
 _OCCUPIED_PERCENT = 50
 _FREE, _OCCUPIED, _UNKNOWN = 0, 1, 2
+_SAME_FRAME = 1e-3
+"""Two frames are one if neither is moved by more than this [m, rad]."""
 
 
 def assemble_recording(
@@ -46,7 +48,7 @@ def assemble_recording(
             poses, used_source = in_map, "map"
     commands = _commands(streams, profile)
     scans = assemble_scans(streams, profile, base)
-    recorded_map = _map(streams)
+    recorded_map = _map(streams, used_source)
     dropped = sum(count for name, count in warnings.items() if name.startswith("dropped_"))
     return Recording(
         poses=poses,
@@ -150,21 +152,13 @@ def _yaws(
 
 def _poses_in_map(streams: CollectedStreams, odometry: PoseStream, base: str) -> PoseStream | None:
     """Give poses in the map's frame, from transforms or a pose topic; None if absent."""
-    edge = next(
-        (
-            edge
-            for edge in streams.transforms
-            if edge[0].rpartition("/")[2] == "map" and edge[1].rpartition("/")[2] == "odom"
-        ),
-        None,
-    )
-    if edge is not None:
-        stamps, corrections = _planar(streams.transforms[edge])
+    if found := _map_to_odometry(streams):
+        stamps, corrections = _planar(found)
         if len(stamps) == 0:
             return None
         # A correction holds until the next; before the first one, the first.
         latest = np.searchsorted(stamps, odometry.stamps_ns, side="right") - 1
-        poses = _compose_rows(corrections[np.maximum(latest, 0)], odometry.poses)
+        poses = compose_rows(corrections[np.maximum(latest, 0)], odometry.poses)
         return PoseStream(stamps_ns=odometry.stamps_ns, poses=poses, twists=odometry.twists)
     direct = next(
         (
@@ -205,14 +199,6 @@ def _planar(blocks: Sequence[Transforms]) -> tuple[IntArray, FloatArray]:
     return stamps[fresh], poses[fresh]
 
 
-def _compose_rows(outer: FloatArray, inner: FloatArray) -> FloatArray:
-    """Compose poses (K, 3) row by row."""
-    cosine, sine = np.cos(outer[:, 2]), np.sin(outer[:, 2])
-    x = outer[:, 0] + cosine * inner[:, 0] - sine * inner[:, 1]
-    y = outer[:, 1] + sine * inner[:, 0] + cosine * inner[:, 1]
-    return np.column_stack((x, y, wrap_angles(outer[:, 2] + inner[:, 2])))
-
-
 def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream | None:
     if not streams.commands:
         return None
@@ -233,9 +219,12 @@ def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream
     return CommandStream(stamps_ns=stamps[last], commands=clean[last])
 
 
-def _map(streams: CollectedStreams) -> RecordedMap | None:
+def _map(streams: CollectedStreams, pose_source: str) -> RecordedMap | None:
     grid = streams.map
     if grid is None:
+        return None
+    if pose_source == "odometry" and _odometry_moves_in_map(streams):
+        streams.warnings["map_of_other_frame"] = 1
         return None
     yaw = _yaw(grid.orientation)
     usable = np.isfinite((grid.resolution, *grid.position[:2], yaw)).all()
@@ -247,6 +236,27 @@ def _map(streams: CollectedStreams) -> RecordedMap | None:
     cells[grid.data < 0] = _UNKNOWN
     origin = Pose2D(float(grid.position[0]), float(grid.position[1]), yaw)
     return RecordedMap(cells=cells, resolution=grid.resolution, origin=origin)
+
+
+def _odometry_moves_in_map(streams: CollectedStreams) -> bool:
+    """Tell whether transforms say that the frame of the odometry is not that of the map."""
+    found = _map_to_odometry(streams)
+    if not found:
+        return False
+    _, corrections = _planar(found)
+    return bool(np.any(np.abs(corrections) > _SAME_FRAME))
+
+
+def _map_to_odometry(streams: CollectedStreams) -> Sequence[Transforms]:
+    """Give the transforms from the map to the odometry; none where the log has none."""
+    return next(
+        (
+            found
+            for (parent, child), found in streams.transforms.items()
+            if parent.rpartition("/")[2] == "map" and child.rpartition("/")[2] == "odom"
+        ),
+        (),
+    )
 
 
 def _yaw(orientation: FloatArray) -> float:

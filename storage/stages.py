@@ -17,7 +17,7 @@ TRAIN = Stage("train", 1)
 EVALUATE = Stage("evaluate", 2)
 REPORT = Stage("report", 1)
 PRETRAIN = Stage("pretrain", 1)
-DEPLOY = Stage("deploy", 1)
+DEPLOY = Stage("deploy", 2)
 
 STAGES = (
     INGEST,

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ses_core.arrays import ByteArray, IntArray
 from storage.collected_streams import CollectedStreams
 from storage.message_decoding import (
     MessageBatch,
+    batch_of,
     decode_grids,
     decode_odometry,
     decode_poses,
@@ -39,8 +41,20 @@ class StreamCollector:
         Raises:
             LogError: They are compressed, and nothing says so.
         """
+        batch = batch_of(_stamps(stamps), contents, is_ros1=self._is_ros1)
+        self._take(topic, message_type, batch)
+
+    def take_rows(self, topic: str, message_type: str, stamps: IntArray, rows: ByteArray) -> None:
+        """Decode messages of a topic and of one length: rows (K, L) at stamps (K,) [ns]."""
+        self._take(topic, message_type, MessageBatch([(stamps, rows)], self._is_ros1))
+
+    def pass_over(self, count: int) -> None:
+        """Count messages of a type that nothing is known of."""
+        self.streams.messages_in += count
+        self.streams.warnings["dropped_other_type"] += count
+
+    def _take(self, topic: str, message_type: str, batch: MessageBatch) -> None:
         streams, choice = self.streams, self._choice
-        batch = MessageBatch(_stamps(stamps), contents, self._is_ros1)
         if topic == choice.scan:
             streams.scans.extend(decode_scans(batch))
         elif topic == choice.odometry:
@@ -56,16 +70,11 @@ class StreamCollector:
             is_static = topic in choice.static_transforms
             for transforms in decode_transforms(batch):
                 streams.add_transforms(transforms, is_static=is_static)
-        streams.messages_in += len(contents)
+        streams.messages_in += sum(len(stamps) for stamps, _ in batch.tables)
         streams.warnings["dropped_malformed"] += batch.malformed.count
 
-    def pass_over(self, count: int) -> None:
-        """Count messages of a type that nothing is known of."""
-        self.streams.messages_in += count
-        self.streams.warnings["dropped_other_type"] += count
 
-
-def _stamps(stamps: Sequence[int]) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+def _stamps(stamps: Sequence[int]) -> IntArray:
     """Give stamps as an array; those beyond any clock become its last moment."""
     try:
         return np.array(stamps, dtype=np.int64)

@@ -19,7 +19,7 @@ from ses_core.settings import Settings
 from ses_core.worlds.deployment import Deployment, deploy
 from ses_core.worlds.homes import generate_homes
 from ses_core.worlds.identity import content_digest
-from ses_core.worlds.pairs import sample_tasks
+from ses_core.worlds.pairs import PairPreset, sample_tasks
 from storage.artifact_store import LocalArtifactStore
 from storage.deployment_logs import FleetFormat, write_deployments
 from storage.materialize import Materialized, materialize
@@ -57,8 +57,9 @@ def fleet_tasks(
     min_distance: float,
     profile: RobotProfile,
     seed: int,
+    preset: PairPreset = "default",
 ) -> list[NavigationTask]:
-    """Spread deployments evenly over worlds, world by world.
+    """Spread deployments evenly over worlds; those in one world follow each other.
 
     Raises:
         WorldError: No world has room for a start and a goal so far apart.
@@ -69,17 +70,24 @@ def fleet_tasks(
             -(-count // len(worlds)),
             profile=profile,
             min_distance=min_distance,
+            preset=preset,
             rng=np.random.default_rng([seed, int(content_digest(world.grid)[:8], 16)]),
         )
         for world in worlds
     ]
     rounds = max(map(len, pairs))
-    spread = [tasks[number] for number in range(rounds) for tasks in pairs if number < len(tasks)]
+    spread = [
+        (place, tasks[number])
+        for number in range(rounds)
+        for place, tasks in enumerate(pairs)
+        if number < len(tasks)
+    ]
     if not spread:
         raise WorldError(
             f"none of {len(worlds)} worlds has two places {min_distance:g} m apart, expected one"
         )
-    return spread[:count]
+    # A robot's drives are written together: what waits for its log stays in memory.
+    return [task for _, task in sorted(spread[:count], key=lambda placed: placed[0])]
 
 
 @task(name="deploy the fleet", cache_policy=NO_CACHE)
@@ -93,6 +101,7 @@ def deploy_fleet(
     out: Path,
     log_format: FleetFormat,
     seed: int,
+    day: date | None,
     store: LocalArtifactStore,
     settings: Settings,
 ) -> FleetDay:
@@ -104,13 +113,14 @@ def deploy_fleet(
         min_distance=settings.evaluation.min_distance_m,
         profile=settings.target_robot,
         seed=seed,
+        preset=settings.fleet.pairs,
     )
     return _drive(
         tasks,
         find_policy(policy, store.layout),
         out=out,
         log_format=log_format,
-        day=datetime.now(UTC).date(),
+        day=day or datetime.now(UTC).date(),
         seed=seed,
         settings=settings,
     )
@@ -131,6 +141,7 @@ def deploy_demonstration(
             "day": fleet.day.isoformat(),
             "policy": policy.policy_id,
             "simulation": settings_json(settings.simulation),
+            "fleet": settings_json(settings.fleet),
             "target_robot": settings_json(settings.target_robot),
         },
     )
@@ -181,8 +192,8 @@ def _drive(
         _counted(driven, total),
         tasks=tasks,
         format=log_format,
-        profile=settings.target_robot,
         day=day,
+        settings=settings,
     )
     total.seconds = round(time.perf_counter() - started, 3)
     return total

@@ -76,5 +76,5 @@ def planar_mount(matrix: FloatArray) -> PlanarMount:
     return PlanarMount(pose=pose, is_upside_down=bool(matrix[2, 2] < 0.0))
 
 
-def _all_finite(values: tuple[float, ...]) -> bool:
+def _all_finite(values: Sequence[float]) -> bool:
     return all(math.isfinite(value) for value in values)

@@ -11,6 +11,7 @@ from rosbags.typesys.store import Typestore
 
 from storage.message_decoding import (
     MessageBatch,
+    batch_of,
     decode_grids,
     decode_odometry,
     decode_poses,
@@ -65,7 +66,7 @@ class Writer:
     def batch(self, name: str, *messages: object) -> MessageBatch:
         serialize = self.types.serialize_ros1 if self.is_ros1 else self.types.serialize_cdr
         contents = [bytes(serialize(message, name)) for message in messages]
-        return MessageBatch(np.arange(len(contents)), contents, self.is_ros1)
+        return batch_of(np.arange(len(contents)), contents, is_ros1=self.is_ros1)
 
     def scan(self, frame: str, numbers: list[float], ranges: list[float]) -> object:
         low, step, near, far = numbers
@@ -208,13 +209,14 @@ def test_poses_and_grids_are_read_as_rosbags_wrote_them(writer: Writer) -> None:
 
 def test_messages_that_end_early_are_counted_and_leave_the_others_alone(writer: Writer) -> None:
     name = "geometry_msgs/msg/Twist"
-    twists = writer.batch(name, *(writer.twist(float(k), 0.5) for k in range(3)))
-    cut = [bytes(twists.contents[0])[:-1], twists.contents[1], b"", twists.contents[2][:9]]
-    batch = MessageBatch(np.arange(4), cut, writer.is_ros1)
+    serialize = writer.types.serialize_ros1 if writer.is_ros1 else writer.types.serialize_cdr
+    whole = [bytes(serialize(writer.twist(float(k), 0.5), name)) for k in range(3)]
+    cut = [whole[0][:-1], whole[1], b"", whole[2][:9]]
+    batch = batch_of(np.arange(4), cut, is_ros1=writer.is_ros1)
     (found,) = decode_twists(batch, name)
     assert (found.stamps_ns.tolist(), found.twists.tolist()) == ([1], [[1.0, 0.5]])
     assert batch.malformed.count == 3
-    empty = MessageBatch(np.arange(1), [bytes(40)], writer.is_ros1)
+    empty = batch_of(np.arange(1), [bytes(40)], is_ros1=writer.is_ros1)
     assert list(decode_grids(empty)) == []
     assert empty.malformed.count == 1
 
@@ -236,6 +238,6 @@ def test_big_endian_messages_are_read_and_kept_apart_from_little_endian_ones() -
     little = b"\x00\x01" + little[2:]
     big = b"\x00\x00" + struct.pack(">2x6d", *range(10, 16))
     name = "geometry_msgs/msg/Twist"
-    batch = MessageBatch(np.arange(2), [little, big], False)
+    batch = batch_of(np.arange(2), [little, big], is_ros1=False)
     found = [block.twists.tolist() for block in decode_twists(batch, name)]
     assert found == [[[0.0, 5.0]], [[10.0, 15.0]]]
