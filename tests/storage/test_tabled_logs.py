@@ -12,16 +12,20 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from ses_core.errors import LogError
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.extraction.extract import ExtractedScenario, extract
+from ses_core.extraction.tabled_drives import split_drives
+from ses_core.extraction.trajectory import Trajectory
 from ses_core.fleet_settings import FleetSettings
 from ses_core.geometry import Pose2D
 from ses_core.navigation import NavigationTask, World
 from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import GENERIC, JACKAL, LaserProfile
-from ses_core.settings import ExtractionSettings, IngestSettings, Settings
+from ses_core.settings import DecoderLimits, ExtractionSettings, IngestSettings, Settings
 from ses_core.worlds.deployment import Deployment
 from storage.artifact_store import LocalArtifactStore
+from storage.bounded_parquet import read_bounded
 from storage.deployment_logs import FleetFormat, write_deployments
 from storage.inbox import scan_inbox
 from storage.inbox_ledger import InboxLedger
@@ -30,6 +34,7 @@ from storage.log_catalogue import catalogue
 from storage.log_formats import LOGS_FILE, MAP_FILE, SCANS_FILE, TRAJECTORIES_FILE
 from storage.quarantine import Quarantine
 from storage.table_log import TableLog
+from storage.tabled_logs import read_tabled_log
 from storage.trajectory_tables import read_log_row, read_trajectories
 
 DAY = date(2026, 11, 22)
@@ -80,7 +85,7 @@ def drive(number: int) -> Deployment:
 def write_fleet(inbox: Path, log_format: FleetFormat, **fleet: Any) -> None:
     settings = Settings(
         target_robot=ROBOT,
-        fleet=FleetSettings(**fleet),
+        fleet=FleetSettings(robots_per_site=1, **fleet),
         ingest=IngestSettings(pose_source="map" if fleet.get("publishes_map") else "odometry"),
     )
     write_deployments(
@@ -146,24 +151,36 @@ def compare(one: ExtractedScenario, other: ExtractedScenario) -> None:
     assert np.array_equal(one.environment.observed, other.environment.observed)
 
 
-@pytest.mark.parametrize("log_format", ["mcap", "bag", "db3"])
-@pytest.mark.parametrize("pose_source", ["odometry", "map"])
+Scenarios = dict[tuple[object, ...], list[ExtractedScenario]]
+
+
+def scenarios_by(folder: Path, log_format: FleetFormat, pose_source: Any) -> Scenarios:
+    """Write the fleet in a format, take its logs in, and extract them."""
+    write_fleet(folder / "inbox", log_format, drives_per_log=3, publishes_map=pose_source == "map")
+    night = Night(folder / "store", IngestSettings(pose_source=pose_source))
+    assert [one.status for one in night.take_in(folder / "inbox")] == ["new"] * 2
+    return night.scenarios()
+
+
+@pytest.fixture(scope="module")
+def direct(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Scenarios]:
+    return {
+        source: scenarios_by(tmp_path_factory.mktemp(source), "tables", source)
+        for source in ("odometry", "map")
+    }
+
+
+@pytest.mark.parametrize(
+    ("log_format", "pose_source"),
+    [("mcap", "odometry"), ("bag", "odometry"), ("db3", "odometry"), ("mcap", "map")],
+)
 def test_bags_and_tables_of_the_same_drives_give_identical_scenarios(
-    tmp_path: Path, log_format: FleetFormat, pose_source: Any
+    tmp_path: Path, direct: dict[str, Scenarios], log_format: FleetFormat, pose_source: str
 ) -> None:
-    found = []
-    for name in ("tables", log_format):
-        inbox = tmp_path / f"inbox-{name}"
-        fleet = {"drives_per_log": 2, "publishes_map": pose_source == "map"}
-        write_fleet(inbox, "tables" if name == "tables" else log_format, **fleet)
-        night = Night(tmp_path / f"store-{name}", IngestSettings(pose_source=pose_source))
-        taken = night.take_in(inbox)
-        assert [one.status for one in taken] == ["new"] * 4
-        found.append(night.scenarios())
-    direct, by_bag = found
-    assert direct.keys() == by_bag.keys()
-    assert sum(len(scenarios) for scenarios in direct.values()) > 12
-    for log, scenarios in direct.items():
+    by_bag = scenarios_by(tmp_path, log_format, pose_source)
+    assert by_bag.keys() == direct[pose_source].keys()
+    assert sum(len(scenarios) for scenarios in by_bag.values()) > 12
+    for log, scenarios in direct[pose_source].items():
         assert len(scenarios) == len(by_bag[log])
         for one, other in zip(scenarios, by_bag[log], strict=True):
             compare(one, other)
@@ -185,16 +202,26 @@ def test_tables_are_known_by_their_content(tmp_path: Path, fleet: Path) -> None:
     assert night.take_in(inbox) == []
     (log, *_) = sorted(inbox.glob("*/*/*.done"))
     log.with_suffix("").rename(log.parent / "moved")
+    log.rename(log.parent / "moved.done")
     (again,) = night.take_in(inbox)
     assert (again.status, again.log_id in {one.log_id for one in first}) == ("known", True)
 
 
-def test_the_night_s_own_settings_say_which_velocity_counts(tmp_path: Path, fleet: Path) -> None:
-    night = Night(tmp_path / "store", IngestSettings(velocity_source="measured"))
-    night.take_in(fleet)
-    for log in catalogue(night.tables):
-        for trajectory in read_trajectories(night.store.path(log.ref)):
-            assert np.array_equal(trajectory.speed, trajectory.measured[:, 0])
+def read(folder: Path, settings: IngestSettings | None = None) -> list[Trajectory]:
+    """What the child does, and what is then done with it, in this process."""
+    log = read_tabled_log(folder, limits=DecoderLimits())
+    return split_drives(log, profile=GENERIC, settings=settings or IngestSettings())
+
+
+@pytest.mark.parametrize("source", ["measured", "commanded", "derived"])
+def test_the_night_s_own_settings_say_which_velocity_counts(fleet: Path, source: Any) -> None:
+    drives = read(_log_in(fleet), IngestSettings(velocity_source=source))
+    assert len(drives) == 3
+    for drive in drives:
+        if source == "derived":
+            assert np.mean(np.abs(drive.speed - drive.measured[:, 0])) < 0.05
+        else:
+            assert np.array_equal(drive.speed, getattr(drive, source)[:, 0])
 
 
 Change = Callable[[dict[str, np.ndarray[Any, Any]]], None]
@@ -285,9 +312,11 @@ def test_tables_with_something_wrong_are_refused_for_it(
     tmp_path: Path, fleet: Path, name: str
 ) -> None:
     file, change, reason, message = BROKEN[name]
-    inbox = _one_log(tmp_path, fleet)
-    rewrite(inbox / "site" / "robot" / "log" / file, change)
-    _require_refused(tmp_path, inbox, reason, message)
+    log = _log_in(_one_log(tmp_path, fleet))
+    rewrite(log / file, change)
+    with pytest.raises(LogError, match=message) as error:
+        read(log)
+    assert error.value.reason == reason
 
 
 def bit_flip(path: Path) -> None:
@@ -310,42 +339,66 @@ def no_table(path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("damage", "reason"),
-    [
-        (bit_flip, "checksum"),
-        (cut_short, "truncated"),
-        (foreign_table, "schema_conflict"),
-        (no_table, "bad_magic"),
-    ],
+    [(bit_flip, "checksum"), (cut_short, "truncated"), (foreign_table, "schema_conflict")],
 )
 def test_damaged_files_are_refused(
     tmp_path: Path, fleet: Path, damage: Callable[[Path], None], reason: str
 ) -> None:
+    log = _log_in(_one_log(tmp_path, fleet))
+    damage(log / TRAJECTORIES_FILE)
+    with pytest.raises(LogError) as error:
+        read(log)
+    assert error.value.reason == reason
+
+
+def test_a_file_that_claims_more_rows_than_fit_is_not_read(tmp_path: Path, fleet: Path) -> None:
+    log = _log_in(fleet)
+    limits = DecoderLimits(output_mib=1)
+    with pytest.raises(LogError) as error:
+        read_bounded(log / SCANS_FILE, "scans", ("ranges_m",), byte_limit=2**16)
+    assert error.value.reason == "size_limit"
+    assert len(read_tabled_log(log, limits=limits).lengths) == 3
+    # A million equal rows take a few kilobytes.
+    path = tmp_path / SCANS_FILE
+    schema = pq.read_schema(log / SCANS_FILE)
+    rows = pq.read_table(log / SCANS_FILE)
+    pq.write_table(rows.take(np.zeros(100_000, dtype=np.int64)), path, compression="zstd")
+    assert path.stat().st_size < 2**20
+    with pytest.raises(LogError) as error:
+        read_bounded(path, "scans", schema.names, byte_limit=2**20)
+    assert error.value.reason in ("size_limit", "memory_limit")
+
+
+@pytest.mark.parametrize("damage", [no_table, cut_short])
+def test_a_refused_folder_goes_into_quarantine_whole(
+    tmp_path: Path, fleet: Path, damage: Callable[[Path], None]
+) -> None:
     inbox = _one_log(tmp_path, fleet)
-    damage(inbox / "site" / "robot" / "log" / TRAJECTORIES_FILE)
-    _require_refused(tmp_path, inbox, reason, "")
-
-
-def test_a_map_is_no_way_in_for_pickles(tmp_path: Path, fleet: Path) -> None:
-    inbox = _one_log(tmp_path, fleet)
-    path = inbox / "site" / "robot" / "log" / MAP_FILE
-    objects = np.array([[{"a": 1}]], dtype=object)
-    np.savez(path, cells=objects, resolution=0.1, origin=np.zeros(3), allow_pickle=True)
-    _require_refused(tmp_path, inbox, "schema_conflict", "no map")
-
-
-def _one_log(tmp_path: Path, fleet: Path) -> Path:
-    log = min(path for path in fleet.glob("*/*/*") if path.is_dir())
-    shutil.copytree(log, tmp_path / "inbox" / "site" / "robot" / "log")
-    (tmp_path / "inbox" / "site" / "robot" / "log.done").touch()
-    return tmp_path / "inbox"
-
-
-def _require_refused(tmp_path: Path, inbox: Path, reason: str, message: str) -> None:
+    damage(_log_in(inbox) / TRAJECTORIES_FILE)
     night = Night(tmp_path / "store")
     (taken,) = night.take_in(inbox)
+    reason = "bad_magic" if damage is no_table else "truncated"
     assert (taken.status, taken.reason) == ("quarantined", reason)
-    assert message in taken.message
     (kept,) = Quarantine(night.store.layout.quarantine).entries()
     assert kept.payload is not None
     assert (kept.payload / TRAJECTORIES_FILE).is_file()
     assert catalogue(night.tables) == []
+
+
+def test_a_map_is_no_way_in_for_pickles(tmp_path: Path, fleet: Path) -> None:
+    log = _log_in(_one_log(tmp_path, fleet))
+    objects = np.array([[{"a": 1}]], dtype=object)
+    np.savez(log / MAP_FILE, cells=objects, resolution=0.1, origin=np.zeros(3), allow_pickle=True)
+    with pytest.raises(LogError, match="no map") as error:
+        read(log)
+    assert error.value.reason == "schema_conflict"
+
+
+def _log_in(inbox: Path) -> Path:
+    return min(path for path in inbox.glob("*/*/*") if path.is_dir())
+
+
+def _one_log(tmp_path: Path, fleet: Path) -> Path:
+    shutil.copytree(_log_in(fleet), tmp_path / "inbox" / "site" / "robot" / "log")
+    (tmp_path / "inbox" / "site" / "robot" / "log.done").touch()
+    return tmp_path / "inbox"
