@@ -6,12 +6,14 @@ leaves something out.
 """
 
 import struct
+from collections import Counter
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import Connection
+from rosbags.rosbag1.reader import IndexData
 from rosbags.rosbag2 import storage_mcap
 
 from ses_core.errors import LogError
@@ -32,8 +34,28 @@ _LENGTH = struct.Struct("<L")
 _TIME = struct.Struct("<LL")
 
 
+class Ros1Reader(rosbag1.Reader):
+    """Opens a ROS 1 bag without its index of messages, which nobody here needs.
+
+    The index may say a thousand times that a message is there; chunks say how many they hold.
+    """
+
+    def open(self) -> None:
+        """Open the bag; its connections count what its chunks say they hold."""
+        super().open()
+        counts: Counter[int] = Counter()
+        for chunk in self.chunk_infos:
+            counts.update(chunk.connection_counts)
+        self.connections = [
+            connection._replace(msgcount=counts[connection.id]) for connection in self.connections
+        ]
+
+    def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
+        """Read nothing: whoever calls it goes to the next chunk's place by itself."""
+
+
 def raw_messages(
-    reader: "rosbag1.Reader | rosbag2.Reader", path: Path, wanted: Collection[Connection]
+    reader: Ros1Reader | rosbag2.Reader, path: Path, wanted: Collection[Connection]
 ) -> Iterator[RawMessage]:
     """Give the messages of some connections, in the order in which they were written.
 
@@ -45,7 +67,7 @@ def raw_messages(
     Raises:
         LogError: The file ends early.
     """
-    if isinstance(reader, rosbag1.Reader):
+    if isinstance(reader, Ros1Reader):
         return _ros1_messages(reader, path, {connection.id: connection for connection in wanted})
     if path.suffix == ".mcap":
         return _mcap_messages(path, {connection.id: connection for connection in wanted})
@@ -104,7 +126,7 @@ def _mcap_records(records: bytes, wanted: dict[int, Connection]) -> Iterator[Raw
 
 
 def _ros1_messages(
-    reader: rosbag1.Reader, path: Path, wanted: dict[int, Connection]
+    reader: Ros1Reader, path: Path, wanted: dict[int, Connection]
 ) -> Iterator[RawMessage]:
     """Read the chunks of a ROS 1 bag."""
     with path.open("rb") as file:
@@ -119,30 +141,73 @@ def _ros1_messages(
 
 def _ros1_records(records: bytes, wanted: dict[int, Connection]) -> Iterator[RawMessage]:
     view, position, end, length_of = memoryview(records), 0, len(records), _LENGTH.unpack_from
+    header = _Ros1Header()
     while position < end:
         (size,) = length_of(records, position)
-        fields = _ros1_fields(records, position + 4, position + 4 + size)
-        position += 4 + size
-        (size,) = length_of(records, position)
-        position += 4
-        if position + size > end:
-            raise ValueError(f"a message of {size} bytes does not fit")
-        if fields[b"op"] == _ROS1_MESSAGE:
-            connection = wanted.get(length_of(fields[b"conn"])[0])
+        start = position + 4
+        (length,) = length_of(records, start + size)
+        position = start + size + 4
+        if position + length > end:
+            raise ValueError(f"a message of {length} bytes does not fit")
+        if header.fits(records, start, size):
+            connection = wanted.get(length_of(records, start + header.connection)[0])
             if connection is not None:
-                seconds, nanoseconds = _TIME.unpack(fields[b"time"])
+                seconds, nanoseconds = _TIME.unpack_from(records, start + header.time)
                 stamp = seconds * 10**9 + nanoseconds
-                yield connection, stamp, view[position : position + size]
-        position += size
+                yield connection, stamp, view[position : position + length]
+        position += length
 
 
-def _ros1_fields(records: bytes, position: int, end: int) -> dict[bytes, bytes]:
-    fields: dict[bytes, bytes] = {}
+class _Ros1Header:
+    """The form of the headers of messages: nearly all of a bag have the same.
+
+    Fields may stand in any order, so the first header is read field by field; another fits if
+    all but its connection and its time is the same.
+    """
+
+    __slots__ = ("_ends", "_rest", "_size", "connection", "time")
+
+    def __init__(self) -> None:
+        self._size = -1
+        self._rest = b""
+        self._ends = (0, 0, 0, 0)
+        self.connection = self.time = 0
+
+    def fits(self, records: bytes, start: int, size: int) -> bool:
+        """Tell whether this is a message's header; `connection` and `time` say where they are."""
+        if size == self._size and self._others(records, start) == self._rest:
+            return True
+        fields = _ros1_fields(records, start, start + size)
+        place, length = fields[b"op"]
+        if records[place : place + length] != _ROS1_MESSAGE:
+            return False
+        (connection, four), (time, eight) = fields[b"conn"], fields[b"time"]
+        if (four, eight) != (_LENGTH.size, _TIME.size):
+            raise ValueError("connection or time of a message has the wrong size")
+        self._size, self.connection, self.time = size, connection - start, time - start
+        spans = sorted(((self.connection, four), (self.time, eight)))
+        (first, first_size), (second, second_size) = spans
+        self._ends = (first, first + first_size, second, second + second_size)
+        self._rest = self._others(records, start)
+        return True
+
+    def _others(self, records: bytes, start: int) -> bytes:
+        first, after_first, second, after_second = self._ends
+        return (
+            records[start : start + first]
+            + records[start + after_first : start + second]
+            + records[start + after_second : start + self._size]
+        )
+
+
+def _ros1_fields(records: bytes, position: int, end: int) -> dict[bytes, tuple[int, int]]:
+    """Give where each field's value lies: (offset, size)."""
+    fields: dict[bytes, tuple[int, int]] = {}
     while position < end:
         (size,) = _LENGTH.unpack_from(records, position)
         position += 4
         name, _, value = records[position : position + size].partition(b"=")
-        fields[name] = value
+        fields[name] = position + size - len(value), len(value)
         position += size
     return fields
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from rosbags import rosbag1, rosbag2
+from rosbags import rosbag2
 from rosbags.interfaces import Connection
 
 from ses_core.errors import LogError
 from ses_core.settings import DecoderLimits
 from storage.bounded_decompression import bound_rosbags, bounded_zstd, inflate_zstd_file
-from storage.raw_messages import RawMessage, raw_messages
+from storage.raw_messages import RawMessage, Ros1Reader, raw_messages
 from storage.sqlite_guard import recover_wal, require_plain_database
 
 METADATA_LIMIT = 2**20
@@ -35,7 +35,7 @@ class OpenRecording:
     ros_version: int
     connections: tuple[Connection, ...]
     warnings: dict[str, int]
-    _parts: tuple[tuple["rosbag1.Reader | rosbag2.Reader", Path], ...]
+    _parts: tuple[tuple[Ros1Reader | rosbag2.Reader, Path], ...]
     _compressed_messages: bool
     _message_limit: int
 
@@ -85,7 +85,7 @@ def open_recording(log: Path, *, limits: DecoderLimits, workdir: Path) -> Iterat
             require_plain_database(part, message_limit=message_limit)
     is_ros1 = log.suffix == ".bag"
     with ExitStack() as stack:
-        readers = [rosbag1.Reader(part) if is_ros1 else rosbag2.Reader(part) for part in parts]
+        readers = [Ros1Reader(part) if is_ros1 else rosbag2.Reader(part) for part in parts]
         for reader in readers:
             stack.enter_context(reader)
         connections = tuple(connection for reader in readers for connection in reader.connections)

@@ -45,7 +45,9 @@ class RosbagLogReader:
                     "missing_topic", "log has neither odometry nor transforms: nothing says a pose"
                 )
             _require_known(recording, choice)
-            streams = _collect(recording, choice, output_limit=self.limits.output_mib * 2**20)
+            streams = collect_streams(
+                recording, choice, output_limit=self.limits.output_mib * 2**20
+            )
         return assemble_recording(streams, profile=profile, pose_source=pose_source)
 
 
@@ -57,10 +59,14 @@ def _require_known(recording: OpenRecording, choice: TopicChoice) -> None:
             require_known_definition(connection, types, ros_version=recording.ros_version)
 
 
-def _collect(
+def collect_streams(
     recording: OpenRecording, choice: TopicChoice, *, output_limit: int
 ) -> CollectedStreams:
-    """Decode the messages of the chosen topics."""
+    """Decode the messages of the chosen topics.
+
+    Raises:
+        LogError: They are too many, too large, or most do not have their type's form.
+    """
     collector = StreamCollector(choice, is_ros1=recording.ros_version == 1)
     types = {
         (connection.topic, connection.msgtype)

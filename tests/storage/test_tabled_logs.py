@@ -72,7 +72,7 @@ def drive(number: int) -> Deployment:
         task=TASKS[number],
         seed=number,
         outcome=EpisodeOutcome.SUCCESS,
-        times=np.arange(steps) * 0.05,
+        times=np.arange(steps, dtype=np.float64) * 0.05,
         poses=poses + np.array([1.0, 2.0, 0.0]),
         odometry=poses,
         measured=np.vstack(([0.0, 0.0], commands)),
@@ -124,9 +124,9 @@ class Night:
             for candidate in found.new
         ]
 
-    def scenarios(self) -> dict[tuple[object, ...], list[ExtractedScenario]]:
+    def scenarios(self) -> "Scenarios":
         """Give the scenarios of each log, by site, robot and name."""
-        extracted = {}
+        extracted: Scenarios = {}
         for log in catalogue(self.tables):
             folder = self.store.path(log.ref)
             row = read_log_row(folder)
