@@ -8,9 +8,11 @@ import json
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from ses_core.arrays import FloatArray, IntArray
 from ses_core.errors import LogError
@@ -161,14 +163,14 @@ def _scans(folder: Path, limit: int) -> tuple[ScanStream | None, FloatArray]:
 
 def _equal_lists(lists: pa.ListArray) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
     """Give lists of one length as rows (S, B)."""
-    offsets = lists.offsets.to_numpy()
+    offsets = np.from_dlpack(lists.offsets)
     lengths = np.unique(np.diff(offsets))
     values = lists.values
     if lists.null_count or values.null_count or len(lengths) != 1:
         raise LogError("schema_conflict", "scans have different numbers of readings")
     if not 1 < lengths[0] <= _BEAM_LIMIT:
         raise LogError("bad_values", f"scans have {lengths[0]} readings, expected 2 or more")
-    flat = values.to_numpy(zero_copy_only=True)[offsets[0] : offsets[-1]]
+    flat = np.from_dlpack(values)[offsets[0] : offsets[-1]]
     return flat.reshape(len(lists), int(lengths[0]))
 
 
@@ -203,10 +205,17 @@ def _require_poses(poses: FloatArray, what: str) -> None:
 
 
 def _whole(rows: pa.Table, name: str) -> IntArray:
-    return rows.column(name).to_numpy().astype(np.int64, copy=False)
+    return _numbers(rows, name).astype(np.int64)
 
 
 def _real(rows: pa.Table, *names: str) -> FloatArray:
-    """Give columns (K, N) of real numbers; null is NaN."""
-    columns = [rows.column(name).to_numpy(zero_copy_only=False) for name in names]
-    return np.column_stack(columns).astype(np.float64, copy=False)
+    """Give columns (K, N) of real numbers."""
+    return np.column_stack([_numbers(rows, name) for name in names]).astype(np.float64, copy=False)
+
+
+def _numbers(rows: pa.Table, name: str) -> NDArray[Any]:
+    """Give a column (K,) as it lies in memory: Arrow's own way to numpy imports pandas first."""
+    column = rows.column(name)
+    if column.null_count:
+        raise LogError("schema_conflict", f"there are nulls in {name}")
+    return np.from_dlpack(column.combine_chunks())
