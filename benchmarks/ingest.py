@@ -32,7 +32,7 @@ FORMATS = {"mcap": ROSBAG2_MCAP, "bag": ROSBAG1, "db3": ROSBAG2_SQLITE}
 TOPICS = ("/scan", "/odom", "/cmd_vel")
 ROUNDS = 5
 MESSAGES = 100_000
-DEPLOYMENTS = 60
+DEPLOYMENTS = 110
 LIMITS = DecoderLimits()
 
 Columns = dict[str, NDArray[Any]]
