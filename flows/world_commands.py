@@ -150,7 +150,12 @@ def deploy(
     ] = False,
     odometry_drift: Annotated[
         float | None,
-        typer.Option(metavar="D", help="Share by which ways and turns are off; 0.01 is real."),
+        typer.Option(
+            metavar="D",
+            min=0.0,
+            max=0.2,
+            help="Share by which ways and turns are off; 0.01 is real.",
+        ),
     ] = None,
     date: DateOption = None,
     simulator: SimulatorOption = None,
