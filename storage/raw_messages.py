@@ -5,9 +5,11 @@ is read once here, from front to back. Nothing depends on an index that claims t
 leaves something out.
 """
 
+import sqlite3
 import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import BinaryIO
 
@@ -71,7 +73,21 @@ def raw_messages(
         return _ros1_messages(reader, path, {connection.id: connection for connection in wanted})
     if path.suffix == ".mcap":
         return _mcap_messages(path, {connection.id: connection for connection in wanted})
-    return reader.messages(connections=wanted)
+    return _sqlite_messages(path, {connection.id: connection for connection in wanted})
+
+
+def _sqlite_messages(path: Path, wanted: dict[int, Connection]) -> Iterator[RawMessage]:
+    """Read a database from front to back: sorting it by time takes longer than reading it."""
+    try:
+        with closing(sqlite3.connect(f"file:{path}?immutable=1", uri=True)) as database:
+            for topic, stamp, content in database.execute(
+                "SELECT topic_id, timestamp, data FROM messages"
+            ):
+                connection = wanted.get(topic)
+                if connection is not None:
+                    yield connection, stamp, content
+    except sqlite3.DatabaseError as error:
+        raise LogError("truncated", f"database cannot be read: {error}") from error
 
 
 def _mcap_messages(path: Path, wanted: dict[int, Connection]) -> Iterator[RawMessage]:
