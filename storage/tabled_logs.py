@@ -171,7 +171,7 @@ def _equal_lists(lists: pa.ListArray) -> "np.ndarray[tuple[int, int], np.dtype[n
     if not 1 < lengths[0] <= _BEAM_LIMIT:
         raise LogError("bad_values", f"scans have {lengths[0]} readings, expected 2 or more")
     flat = np.from_dlpack(values)[offsets[0] : offsets[-1]]
-    return flat.reshape(len(lists), int(lengths[0]))
+    return flat.reshape(len(lists), int(lengths[0])).astype(np.float32, copy=False)
 
 
 def _map(folder: Path, limit: int) -> RecordedMap | None:
