@@ -18,7 +18,7 @@ from rosbags.highlevel import AnyReader
 from flows.fleet_deployment import deploy
 from ses_core.fleet_settings import FleetSettings
 from ses_core.robot_profile import GENERIC
-from ses_core.settings import DecoderLimits, Settings
+from ses_core.settings import DecoderLimits, EvaluationSettings, Settings
 from ses_core.worlds.homes import generate_homes
 from storage.collected_streams import CollectedStreams
 from storage.log_decoder import decode_log
@@ -70,7 +70,7 @@ def measure(
 def _write_day(scratch: Path, homes: Path, name: str, deployments: int) -> Path:
     """Let one robot drive all day, all of it in one log."""
     out = scratch / f"day-{name}"
-    fleet = FleetSettings(robots_per_site=1, drives_per_log=deployments, pairs="long")
+    fleet = FleetSettings(robots_per_site=1, drives_per_log=deployments)
     deploy(
         root=scratch / "store",
         worlds=(homes,),
@@ -78,7 +78,7 @@ def _write_day(scratch: Path, homes: Path, name: str, deployments: int) -> Path:
         deployments=deployments,
         format=name,  # type: ignore[arg-type]  # one of them
         date=date(2026, 1, 2),
-        settings=Settings(fleet=fleet),
+        settings=Settings(fleet=fleet, evaluation=EvaluationSettings(pair_preset="long")),
     )
     (done,) = out.rglob("*.done")
     return done.with_suffix("")

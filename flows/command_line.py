@@ -11,6 +11,7 @@ from typer._click.exceptions import UsageError
 
 from flows import (
     bench_commands,
+    export_commands,
     log_commands,
     night_commands,
     policy_commands,
@@ -40,6 +41,7 @@ for group in (
     night_commands,
     log_commands,
     show_commands,
+    export_commands,
     quarantine_commands,
     world_commands,
     training_commands,

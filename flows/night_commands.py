@@ -94,10 +94,10 @@ def nightly(
         raise typer.BadParameter(f"found {deadline}, expected hours > 0", param_hint="--deadline")
     worlds = tuple(heldout_worlds or ())
     if worlds:
-        from storage.world_sets import find_worlds
+        from storage.world_sets import read_worlds
 
         with misuse("--heldout-worlds"):
-            find_worlds(worlds, part=part, resolution=resolution)
+            read_worlds(worlds, part=part, resolution=resolution)
     with embedded_server(command.root):
         from flows.nightly_batch import nightly as nightly_flow
 

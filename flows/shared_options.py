@@ -37,6 +37,13 @@ ResolutionOption = Annotated[
     float | None,
     typer.Option("--resolution", metavar="R", help="Of images that carry none [m per pixel]."),
 ]
+PairPresetOption = Annotated[
+    Literal["default", "long"] | None,
+    typer.Option(
+        "--pair-preset",
+        help="Pairs: anywhere far enough apart, or long ones for several scenarios a drive.",
+    ),
+]
 SimulatorOption = Annotated[
     SimulatorName | None,
     typer.Option("--simulator", help="Compiled and kinematic, or PyBullet's rigid bodies."),

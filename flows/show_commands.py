@@ -10,20 +10,19 @@ from typer.core import TyperCommand
 
 from flows import episode_commands
 from flows.command_context import aligned, command_context
+from flows.id_lookup import TABLES, find_row
 from ses_core.recipes import JsonValue
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from ses_core.settings import Settings
     from storage.layout import Layout
 
 app = typer.Typer()
 
 IdArgument = Annotated[
-    str, typer.Argument(metavar="ID", help="Of a scenario, an environment or a log.")
+    str,
+    typer.Argument(metavar="ID", help="Of a scenario, an environment or a log, or its beginning."),
 ]
-TABLES = {"scenarios": "scenario_id", "environments": "environment_id", "logs": "log_id"}
 EPISODE = "episode"
 UNSHOWN = ("cells", "observed")
 
@@ -63,6 +62,7 @@ def show(
     command = command_context(context)
     layout = command.existing_store()
     table, row = find_row(layout, identity)
+    identity = str(row[TABLES[table]])
     target = (out or Path(f"{identity}.png")).absolute()
     picture = draw(layout, table, row, command.settings())
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -71,25 +71,6 @@ def show(
     facts["picture"] = str(target)
     listed: list[dict[str, JsonValue]] = [{"what": key, "value": facts[key]} for key in facts]
     command.answer([facts], lambda: aligned(listed))
-
-
-def find_row(layout: "Layout", identity: str) -> tuple[str, dict[str, JsonValue]]:
-    """Find the table and the row that an id names.
-
-    Raises:
-        typer.BadParameter: Nothing has this id.
-    """
-    from storage.table_reader import open_table
-
-    for table, column in TABLES.items():
-        rows = open_table(layout.root, table)
-        found = rows[rows[column] == identity]
-        if len(found):
-            return table, _plain(found.iloc[0])
-    raise typer.BadParameter(
-        f"found {identity!r}, expected the id of a scenario, an environment or a log",
-        param_hint="ID",
-    )
 
 
 def draw(layout: "Layout", table: str, row: Mapping[str, JsonValue], settings: "Settings") -> bytes:
@@ -127,15 +108,3 @@ def _draw_recorded(layout: "Layout", row: Mapping[str, JsonValue], settings: "Se
         target=settings.target_robot,
         scan_margin=settings.extraction.scan_margin_s,
     )
-
-
-def _plain(row: "pd.Series") -> dict[str, JsonValue]:
-    """Give a row as JSON values; what is missing is null."""
-    import pandas as pd
-
-    plain: dict[str, JsonValue] = {}
-    for name, value in row.items():
-        if hasattr(value, "tolist"):
-            value = value.tolist()
-        plain[str(name)] = value if isinstance(value, list) or not pd.isna(value) else None
-    return plain

@@ -13,6 +13,7 @@ from flows.prefect_server import embedded_server
 from flows.shared_options import (
     CountKindOption,
     OutOption,
+    PairPresetOption,
     PartOption,
     ResolutionOption,
     SeedOption,
@@ -168,6 +169,7 @@ def evaluate(
     min_distance: Annotated[
         float | None, typer.Option(metavar="D", help="Least start-goal distance [m].")
     ] = None,
+    pair_preset: PairPresetOption = None,
     simulator: SimulatorOption = None,
     seed: SeedOption = None,
 ) -> None:
@@ -179,6 +181,7 @@ def evaluate(
                 "evaluation.pairs": pairs,
                 "evaluation.trials": trials,
                 "evaluation.min_distance_m": min_distance,
+                "evaluation.pair_preset": pair_preset,
                 "evaluation.simulator": simulator,
                 "evaluation.seed": seed,
             }

@@ -1,50 +1,29 @@
-"""`ses worlds`: sets of worlds, and `ses deploy`: a simulated fleet's day in them."""
+"""`ses worlds generate`, and `ses deploy`: a simulated fleet's day in them."""
 
-from collections.abc import Sequence
 from datetime import datetime
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
-from flows.command_arguments import existing_path, misuse
-from flows.command_context import CommandContext, aligned, answer_facts, command_context, given
+from flows.command_context import answer_facts, command_context, given
 from flows.policy_names import check_policies
 from flows.shared_options import (
     OutOption,
+    PairPresetOption,
     PartOption,
     ResolutionOption,
     SeedOption,
     SimulatorOption,
     WorldsOption,
 )
-from ses_core.recipes import JsonValue
-
-if TYPE_CHECKING:
-    from ses_core.navigation import World
+from flows.world_set_commands import answer_worlds, worlds_app
 
 app = typer.Typer()
-worlds_app = typer.Typer(
-    name="worlds",
-    help="Make, import and look at sets of worlds.",
-    epilog="Example: ses worlds generate barn --count 12 --out barn-worlds",
-)
 app.add_typer(worlds_app)
-
-SHEET_WORLDS = 36
-"""Worlds on a contact sheet when nothing else is asked for."""
 
 DateOption = Annotated[
     datetime | None,
     typer.Option(formats=["%Y-%m-%d"], metavar="YYYY-MM-DD", help="Day it drove; else today."),
-]
-MapPaths = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="PATH...",
-        help="Maps, images, BARN .world files, world sets, or folders of these.",
-        callback=lambda paths: [existing_path(path, "PATH") for path in paths],
-    ),
 ]
 
 
@@ -68,50 +47,7 @@ def generate(
 
         worlds = generate_homes(count, seed=seed)
     write_world_set(out, worlds)
-    _answer_worlds(command_context(context), worlds)
-
-
-@worlds_app.command(
-    "import", epilog="Example: ses worlds import maps --resolution 0.05 --out fleet-maps"
-)
-def import_worlds(
-    context: typer.Context,
-    paths: MapPaths,
-    out: OutOption,
-    resolution: ResolutionOption = None,
-    part: PartOption = None,
-) -> None:
-    """Read maps of any kind and write them as one world set."""
-    from storage.world_sets import find_worlds, write_world_set
-
-    with misuse("PATH"):
-        found = find_worlds(paths, part=part, resolution=resolution)
-    write_world_set(out, found.worlds)
-    _answer_worlds(command_context(context), found.worlds, passed_over=len(found.passed_over))
-
-
-@worlds_app.command(epilog="Example: ses worlds show barn-worlds --out barn.png")
-def show(
-    context: typer.Context,
-    paths: MapPaths,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Draw a contact sheet there.")
-    ] = None,
-    resolution: ResolutionOption = None,
-    part: PartOption = None,
-) -> None:
-    """List worlds, and draw them."""
-    from storage.world_sets import find_worlds
-
-    with misuse("PATH"):
-        found = find_worlds(paths, part=part, resolution=resolution)
-    if out is not None:
-        from ses_core.pictures.world_figure import world_sheet
-        from storage.durable_files import replace_file
-
-        out.absolute().parent.mkdir(parents=True, exist_ok=True)
-        replace_file(out.absolute(), world_sheet(found.worlds[:SHEET_WORLDS]))
-    _answer_worlds(command_context(context), found.worlds, passed_over=len(found.passed_over))
+    answer_worlds(command_context(context), worlds)
 
 
 @app.command(
@@ -131,10 +67,7 @@ def deploy(
     min_distance: Annotated[
         float | None, typer.Option(metavar="D", help="Least start-goal distance [m].")
     ] = None,
-    pairs: Annotated[
-        Literal["default", "long"] | None,
-        typer.Option(help="Or at least half of the world's diagonal apart."),
-    ] = None,
+    pair_preset: PairPresetOption = None,
     robots: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Robots that take turns in a world.")
     ] = None,
@@ -174,7 +107,7 @@ def deploy(
         {
             "evaluation.simulator": simulator,
             "evaluation.min_distance_m": min_distance,
-            "fleet.pairs": pairs,
+            "evaluation.pair_preset": pair_preset,
             "fleet.robots_per_site": robots,
             "fleet.drives_per_log": drives_per_log,
             "fleet.split_s": split_seconds,
@@ -203,21 +136,3 @@ def deploy(
             settings=settings,
         )
     answer_facts(command, summary.model_dump(mode="json"))
-
-
-def _answer_worlds(
-    command: CommandContext, worlds: Sequence["World"], *, passed_over: int = 0
-) -> None:
-    rows: list[dict[str, JsonValue]] = [
-        {
-            "world_id": world.world_id,
-            "name": world.name,
-            "width_m": round(world.grid.width_m, 3),
-            "height_m": round(world.grid.height_m, 3),
-            "resolution_m": world.grid.resolution,
-            "free_fraction": round(float((~world.grid.cells).mean()), 4),
-        }
-        for world in worlds
-    ]
-    note = f"\n{passed_over} files that are no maps were passed over" if passed_over else ""
-    command.answer({"worlds": rows, "passed_over": passed_over}, lambda: aligned(rows) + note)

@@ -29,6 +29,10 @@ class WorldError(SesError):
     """A map or world that cannot be read or cannot be used."""
 
 
+class NotAMapError(WorldError):
+    """A file of a kind that may hold a map and holds something else: folders pass over it."""
+
+
 class SynthesisError(SesError):
     """Environments that cannot be synthesized from what there is."""
 

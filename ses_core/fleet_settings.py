@@ -1,7 +1,5 @@
 """`FleetSettings`: how a simulated fleet's day is laid out, and what its robots record."""
 
-from typing import Literal
-
 from pydantic import Field
 
 from ses_core.settings_model import SettingsModel
@@ -24,9 +22,4 @@ class FleetSettings(SettingsModel):
     )
     publishes_map: bool = Field(
         False, description="Record the world as a map, and where the odometry lies in it."
-    )
-    pairs: Literal["default", "long"] = Field(
-        "default",
-        description="Start-goal pairs at the least distance of `evaluation`, or `long`: at least "
-        "half of the world's diagonal apart.",
     )

@@ -259,6 +259,11 @@ class EvaluationSettings(SettingsModel):
     pairs: int = Field(5, ge=1, description="Start-goal pairs per world larger than a scenario.")
     trials: int = Field(4, ge=1, description="Trials per pair and policy, each with its own seed.")
     min_distance_m: float = Field(6.6, gt=0, description="Least straight start-goal distance.")
+    pair_preset: Literal["default", "long"] = Field(
+        "default",
+        description="'long': start and goal also nearly as far apart as any two places of the "
+        "world, which gives several scenarios a drive.",
+    )
     seed: int = Field(0, ge=0, description="Seed of pairs and trials; the same for all policies.")
     simulator: Literal["batch", "bullet"] = Field("batch", description="Where it is measured.")
     spot_checks: int = Field(3, ge=0, description="Worlds repeated in PyBullet every night.")

@@ -20,7 +20,8 @@ from storage.message_layouts import (
     Serialization,
 )
 
-_ODOM_FRAME, _BASE_FRAME, _LASER_FRAME, _MAP_FRAME = "odom", "base_link", "laser", "map"
+MAP_FRAME = "map"
+_ODOM_FRAME, _BASE_FRAME, _LASER_FRAME = "odom", "base_link", "laser"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,13 +82,12 @@ def message_streams(content: BagContent, serialization: Serialization) -> Iterat
         rows = _transform_rows(serialization, start, _pose_array(mount), _BASE_FRAME, _LASER_FRAME)
         yield MessageStream("/tf_static", TRANSFORMS, start, rows)
     if content.map is not None:
-        rows = _map_rows(serialization, start, content.map)
-        yield MessageStream("/map", OCCUPANCY_GRID, start, rows)
+        yield map_stream(content.map, stamp_ns=int(start[0]), serialization=serialization)
     if content.map_to_odom is not None:
         found = content.map_to_odom
         corrections = _pose_array(found) if isinstance(found, Pose2D) else found
         corrections = np.broadcast_to(corrections, poses.poses.shape)
-        rows = _transform_rows(serialization, headers, corrections, _MAP_FRAME, _ODOM_FRAME)
+        rows = _transform_rows(serialization, headers, corrections, MAP_FRAME, _ODOM_FRAME)
         yield MessageStream("/tf", TRANSFORMS, transform_stamps, rows)
     rows = _transform_rows(serialization, headers, poses.poses, _ODOM_FRAME, _BASE_FRAME)
     yield MessageStream("/tf", TRANSFORMS, transform_stamps, rows)
@@ -102,9 +102,17 @@ def message_streams(content: BagContent, serialization: Serialization) -> Iterat
         yield MessageStream("/scan", LASER_SCAN, content.scans.stamps_ns, rows)
     if content.goals is not None and content.goal_stamps_ns is not None:
         topic = "/move_base_simple/goal" if serialization == "ros1" else "/goal_pose"
-        frame = _ODOM_FRAME if content.map_to_odom is None else _MAP_FRAME
+        frame = _ODOM_FRAME if content.map_to_odom is None else MAP_FRAME
         rows = _goal_rows(serialization, content.goal_stamps_ns, content.goals, frame)
         yield MessageStream(topic, POSE_STAMPED, content.goal_stamps_ns, rows)
+
+
+def map_stream(
+    recorded: RecordedMap, *, stamp_ns: int, serialization: Serialization
+) -> MessageStream:
+    """Serialize a map, published once, in the frame `map`."""
+    stamps = np.array([stamp_ns], dtype=np.int64)
+    return MessageStream("/map", OCCUPANCY_GRID, stamps, _map_rows(serialization, stamps, recorded))
 
 
 def _or(given: IntArray | None, default: IntArray) -> IntArray:
@@ -194,7 +202,7 @@ def _map_rows(
 ) -> NDArray[np.void]:
     height, width = recorded.cells.shape
     layout = LayoutBuilder(serialization)
-    layout.add_header(_MAP_FRAME)
+    layout.add_header(MAP_FRAME)
     layout.add("load_sec", "u4")
     layout.add("load_nanosec", "u4")
     layout.add_constant("resolution", "f4", recorded.resolution)

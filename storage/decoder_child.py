@@ -1,6 +1,6 @@
-"""The limited process: reads one log, writes plain arrays, and can do nothing else.
+"""The limited process: reads one log or mesh, writes plain arrays, and can do nothing else.
 
-Run by `storage.log_decoder` as `python -m storage.decoder_child REQUEST.json` with an empty
+Run by `storage.limited_process` as `python -m storage.decoder_child REQUEST.json` with an empty
 environment, in a folder and a session of its own. It never runs with `-O`: some of rosbags'
 guards are assertions.
 """
@@ -50,27 +50,12 @@ def _confine(limits: dict[str, int], *, parent: int) -> None:
 
 
 def decode_request(request: Mapping[str, object], *, scratch: Path) -> dict[str, str]:
-    """Decode the log and say how it went: the reason is empty where it went well."""
+    """Decode the file and say how it went: the reason is empty where it went well."""
     # Imported under the limits, so that what they need counts too.
     from ses_core.errors import LogError
-    from ses_core.robot_profile import RobotProfile
-    from ses_core.settings import DecoderLimits
-    from storage.log_formats import TABLES, make_reader
-    from storage.recording_files import write_recording, write_tabled_log
 
-    limits = DecoderLimits.model_validate(request["limits"])
-    profile = RobotProfile.model_validate(request["profile"])
-    log, output = Path(str(request["log"])), Path(str(request["output"]))
     try:
-        if request["format"] == TABLES:
-            # Arrow takes a moment to import, which a bag need not wait for.
-            from storage.tabled_logs import read_tabled_log
-
-            write_tabled_log(output, read_tabled_log(log, limits=limits))
-        else:
-            reader = make_reader(str(request["format"]), limits=limits, workdir=scratch)
-            pose_source = str(request["pose_source"])
-            write_recording(output, reader.read(log, profile=profile, pose_source=pose_source))
+        _decode(request, scratch)
     except LogError as error:
         return {"reason": error.reason, "message": str(error)[:_MESSAGE_LIMIT]}
     except (MemoryError, RecursionError, OSError) as error:
@@ -78,6 +63,38 @@ def decode_request(request: Mapping[str, object], *, scratch: Path) -> dict[str,
     except Exception as error:  # noqa: BLE001 - 13 kinds of errors come out of damaged bags
         return {"reason": _damage_reason(error), "message": _describe(error)}
     return {"reason": "", "message": ""}
+
+
+def _decode(request: Mapping[str, object], scratch: Path) -> None:
+    """Write what is wanted of the file: its recording, its drives, its map, or its triangles."""
+    from ses_core.robot_profile import RobotProfile
+    from ses_core.settings import DecoderLimits
+
+    limits = DecoderLimits.model_validate(request["limits"])
+    file, output, kind = Path(str(request["log"])), Path(str(request["output"])), request["format"]
+    if request["wanted"] == "triangles":
+        from storage.mesh_triangles import decode_triangles
+
+        decode_triangles(file, output, format=str(kind))
+    elif request["wanted"] == "map":
+        from storage.recording_files import write_recorded_map
+        from storage.rosbag_logs import read_recorded_map
+
+        write_recorded_map(output, read_recorded_map(file, limits=limits, workdir=scratch))
+    elif request["wanted"] == "tables":
+        # Arrow takes a moment to import, which a bag need not wait for.
+        from storage.recording_files import write_tabled_log
+        from storage.tabled_logs import read_tabled_log
+
+        write_tabled_log(output, read_tabled_log(file, limits=limits))
+    else:
+        from storage.log_formats import make_reader
+        from storage.recording_files import write_recording
+
+        profile = RobotProfile.model_validate(request["profile"])
+        reader = make_reader(str(kind), limits=limits, workdir=scratch)
+        pose_source = str(request["pose_source"])
+        write_recording(output, reader.read(file, profile=profile, pose_source=pose_source))
 
 
 def _resource_reason(error: BaseException) -> str:

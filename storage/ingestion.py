@@ -241,9 +241,7 @@ def _decode(
     """Decode a log and put it on the clock; also give how often it was cut, by cause."""
     workdir = store.layout.staging
     if claimed.format == TABLES:
-        tabled = decode_tables(
-            claimed.payload, profile=profile, limits=settings.limits, workdir=workdir
-        )
+        tabled = decode_tables(claimed.payload, limits=settings.limits, workdir=workdir)
         drives = split_drives(tabled, profile=profile, settings=settings)
         # What it was cut by stands among its warnings already.
         return tabled.recording, drives, {}

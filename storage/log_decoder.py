@@ -1,45 +1,22 @@
-"""One log in one limited process: memory, time, sizes and privileges are capped.
+"""One log, decoded in a limited process.
 
 Whatever a log does to its decoder, it does to a child that is thrown away: the caller gets a
 `Recording` or a `LogError` with a reason.
 """
 
-import json
-import os
-import signal
-import subprocess
-import sys
-import tempfile
 from pathlib import Path
-from typing import Protocol, TypeVar
 
-from ses_core.errors import ArtifactError, LogError
-from ses_core.extraction.recording import Recording
+from ses_core.extraction.recording import RecordedMap, Recording
 from ses_core.extraction.tabled_drives import TabledLog
 from ses_core.recipes import JsonValue, settings_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import DecoderLimits
+from storage.limited_process import decoded_in_child
 from storage.log_formats import TABLES
-from storage.quarantine import REASONS
-from storage.recording_files import read_recording, read_tabled_log_back
-
-Decoded = TypeVar("Decoded", covariant=True)
+from storage.recording_files import read_recorded_map, read_recording, read_tabled_log_back
 
 DECODER_VERSION = 2
 """Raised whenever more logs, or the same logs better, are decoded: refused ones are tried again."""
-
-_OUTCOME_LIMIT = 2**16
-_ERROR_LIMIT = 500
-_KEPT_VARIABLES = ("LD_LIBRARY_PATH", "SYSTEMROOT")
-_ENVIRONMENT = {
-    "LANG": "C.UTF-8",
-    # One thread each: a thread pool alone would take most of the address space allowed.
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    # Arrow's own pool reserves a gigabyte of addresses at once.
-    "ARROW_DEFAULT_MEMORY_POOL": "system",
-}
 
 
 def decode_log(
@@ -51,7 +28,7 @@ def decode_log(
     limits: DecoderLimits,
     workdir: Path,
 ) -> Recording:
-    """Decode a spooled log in a child process; any but one of tables.
+    """Decode a spooled log in a child process.
 
     Args:
         log: Named by us, never by whoever uploaded it.
@@ -65,118 +42,36 @@ def decode_log(
         LogError: The log cannot be used; the reason is from `storage.quarantine.REASONS`.
         ArtifactError: The machine failed, not the log.
     """
-    return _decode(
-        log,
-        {"format": format, "profile": settings_json(profile), "pose_source": pose_source},
-        limits=limits,
-        workdir=workdir,
-        read=read_recording,
-    )
+    request: dict[str, JsonValue] = {
+        "wanted": "recording",
+        "format": format,
+        "profile": settings_json(profile),
+        "pose_source": pose_source,
+    }
+    with decoded_in_child(log, request, limits=limits, workdir=workdir) as output:
+        return read_recording(output, byte_limit=2 * limits.output_mib * 2**20)
 
 
-def decode_tables(
-    log: Path, *, profile: RobotProfile, limits: DecoderLimits, workdir: Path
-) -> TabledLog:
+def decode_tables(log: Path, *, limits: DecoderLimits, workdir: Path) -> TabledLog:
     """Read a spooled folder of tables in a child process; see `decode_log`."""
-    return _decode(
-        log,
-        {"format": TABLES, "profile": settings_json(profile), "pose_source": ""},
-        limits=limits,
-        workdir=workdir,
-        read=read_tabled_log_back,
-    )
+    request: dict[str, JsonValue] = {"wanted": "tables", "format": TABLES}
+    with decoded_in_child(log, request, limits=limits, workdir=workdir) as output:
+        return read_tabled_log_back(output, byte_limit=2 * limits.output_mib * 2**20)
 
 
-class _ReadBack(Protocol[Decoded]):
-    def __call__(self, directory: Path, *, byte_limit: int) -> Decoded: ...
-
-
-def _decode(
+def decode_map(
     log: Path,
-    asked: dict[str, JsonValue],
     *,
+    format: str,  # noqa: A002 - the contract's word
     limits: DecoderLimits,
     workdir: Path,
-    read: "_ReadBack[Decoded]",
-) -> Decoded:
-    size = _size(log)
-    if size > limits.log_mib * 2**20:
-        raise LogError("size_limit", f"log has {size} bytes, expected at most {limits.log_mib} MiB")
-    workdir.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=workdir, prefix="decode-") as folder:
-        home = Path(folder)
-        output, scratch = home / "output", home / "scratch"
-        output.mkdir()
-        scratch.mkdir()
-        request = {
-            **asked,
-            "log": str(log.absolute()),
-            "limits": settings_json(limits),
-            "output": str(output.absolute()),
-            "parent": os.getpid(),
-        }
-        (home / "request.json").write_text(json.dumps(request), encoding="utf-8")
-        _run(home.absolute(), scratch, limits)
-        reason, message = _outcome(home / "outcome.json")
-        if reason:
-            raise LogError(reason, message)
-        return read(output, byte_limit=2 * limits.output_mib * 2**20)
-
-
-def _run(home: Path, scratch: Path, limits: DecoderLimits) -> None:
-    """Run the child to its end, or to the end of its time.
+) -> RecordedMap:
+    """Decode the latest map of a ROS log in a child process, and nothing else of it.
 
     Raises:
-        LogError: It was killed or died; an orderly refusal is not an error here.
+        LogError: The log cannot be used; `missing_topic`: it has no map.
+        ArtifactError: The machine failed, not the log.
     """
-    environment = {**_ENVIRONMENT, "TMPDIR": str(scratch)}
-    environment.update({name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ})
-    with (home / "stderr").open("wb") as stderr:
-        child = subprocess.Popen(
-            [sys.executable, "-I", "-m", "storage.decoder_child", str(home / "request.json")],
-            cwd=scratch,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=stderr,
-            start_new_session=True,
-        )
-        try:
-            status = child.wait(timeout=limits.wall_s)
-        except subprocess.TimeoutExpired as error:
-            raise LogError("time_limit", f"decoding took more than {limits.wall_s:g} s") from error
-        finally:
-            # The whole session goes, also when we are interrupted.
-            if child.poll() is None:
-                os.killpg(child.pid, signal.SIGKILL)
-                child.wait()
-    if status in (-signal.SIGXCPU, -signal.SIGKILL) and not (home / "outcome.json").exists():
-        raise LogError("time_limit", f"decoding took more than {limits.cpu_s} s of processor time")
-    if status != 0:
-        errors = (home / "stderr").read_bytes()[-_ERROR_LIMIT:].decode("utf-8", errors="replace")
-        last = errors.strip().splitlines()[-1:] or ["no message"]
-        if "MemoryError" in last[0]:
-            raise LogError("memory_limit", f"decoder ran out of memory: {last[0]}")
-        raise LogError("decoder_bug", f"decoder ended with status {status}: {last[0]}")
-
-
-def _outcome(path: Path) -> tuple[str, str]:
-    """Read why the child refused the log; an empty reason where it did not."""
-    try:
-        if path.stat().st_size > _OUTCOME_LIMIT:
-            raise ValueError("outcome is too long")
-        outcome = json.loads(path.read_text(encoding="utf-8"))
-        reason, message = str(outcome["reason"]), str(outcome["message"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise LogError("decoder_bug", f"decoder left no outcome: {error}") from error
-    if reason and reason not in REASONS:
-        raise LogError("decoder_bug", f"decoder gave the unknown reason {reason[:40]!r}")
-    return reason, message
-
-
-def _size(log: Path) -> int:
-    try:
-        files = list(log.iterdir()) if log.is_dir() else [log]
-        return sum(path.stat().st_size for path in files)
-    except OSError as error:
-        raise ArtifactError(f"spooled log {log} cannot be read: {error}") from error
+    request: dict[str, JsonValue] = {"wanted": "map", "format": format}
+    with decoded_in_child(log, request, limits=limits, workdir=workdir) as output:
+        return read_recorded_map(output, byte_limit=2 * limits.output_mib * 2**20)

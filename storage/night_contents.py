@@ -13,6 +13,7 @@ from ses_core.extraction.funnel import (
     funnel_steps,
 )
 from ses_core.extraction.holdout import Holdout
+from ses_core.extraction.selection import COUNT_COLUMNS
 from ses_core.navigation import NavigationDomain
 from storage.artifact_store import LocalArtifactStore
 from storage.environment_files import read_environments
@@ -33,6 +34,7 @@ from storage.night_report import (
 )
 from storage.policy_files import read_curve, read_policy
 from storage.quarantine import REASONS
+from storage.scenario_tables import environments_of
 from storage.selection_files import StoredSelection, read_selection
 from storage.stage_records import read_record
 from storage.table_reader import open_table
@@ -71,7 +73,7 @@ def gather_night(night: NightArtifacts, *, store: LocalArtifactStore) -> NightRe
         waiting_logs=night.waiting_logs,
         funnel=_funnel(night, selection, logs=len(logs), synthesized=len(synthesized.environments)),
         sensitivity=_sensitivity(night, selection),
-        challenging=_challenging(selection),
+        recorded=_recorded(night, selection, scenarios, store=store),
         synthesis=(
             read_record(store.path(night.environments) / SYNTHESIS_FILE, SynthesisUse)
             if night.environments
@@ -79,7 +81,10 @@ def gather_night(night: NightArtifacts, *, store: LocalArtifactStore) -> NightRe
         ),
         synthesized=tuple(
             ShownEnvironment(
-                environment_id=one.environment_id, cells=one.cells, observed=one.observed
+                environment_id=one.environment_id,
+                cells=one.cells,
+                observed=one.observed,
+                origin=one.origin,
             )
             for one in synthesized.environments
         ),
@@ -155,19 +160,59 @@ def _sensitivity(night: NightArtifacts, selection: StoredSelection | None) -> Se
     )
 
 
-def _challenging(selection: StoredSelection | None) -> tuple[ShownEnvironment, ...]:
-    if selection is None or selection.pool.empty:
+def _recorded(
+    night: NightArtifacts,
+    selection: StoredSelection | None,
+    scenarios: pd.DataFrame,
+    *,
+    store: LocalArtifactStore,
+) -> tuple[ShownEnvironment, ...]:
+    """Give the pool, hardest first, then what else the night's own logs show, likewise."""
+    if selection is None:
         return ()
-    rows = selection.pool.to_dict("records")
-    return tuple(
+    chosen = tuple(
         ShownEnvironment(
             environment_id=one.environment_id,
             cells=one.cells,
             observed=one.observed,
-            caption=f"{row['count']:g}",
-            detail=f"scenario {row['scenario_id']} of {row['site']}/{row['robot']}",
+            origin=one.origin,
+            scenario_id=row["scenario_id"],
+            site=row["site"],
+            robot=row["robot"],
+            count=row["count"],
         )
-        for one, row in zip(selection.pool_environments.environments, rows, strict=True)
+        for one, row in zip(
+            selection.pool_environments.environments,
+            selection.pool.to_dict("records"),
+            strict=True,
+        )
+    )
+    own = scenarios[
+        scenarios["log_id"].isin(night.log_ids)
+        & (scenarios["kind"] == "scenario")
+        & ~scenarios["environment_id"].isin([one.environment_id for one in chosen])
+    ]
+    places = open_table(
+        store.layout.root, "environments", since=night.batch_date, until=night.batch_date
+    ).drop_duplicates("environment_id")
+    rest = own.merge(
+        places.drop(columns="scenario_id"), on="environment_id", validate="many_to_one"
+    ).assign(count=lambda rows: rows[COUNT_COLUMNS[night.settings.filter.count_kind]])
+    rest = rest.sort_values(["count", "scenario_id"], ascending=[False, True])
+    return chosen + tuple(
+        ShownEnvironment(
+            environment_id=one.environment_id,
+            cells=one.cells,
+            observed=one.observed,
+            origin=one.origin,
+            scenario_id=row["scenario_id"],
+            site=row["site"],
+            robot=row["robot"],
+            count=None if pd.isna(row["count"]) else float(row["count"]),
+            is_traversable=row["is_traversable"],
+            is_chosen=False,
+        )
+        for one, row in zip(environments_of(rest), rest.to_dict("records"), strict=True)
     )
 
 

@@ -71,13 +71,28 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShownEnvironment:
-    """One picture of a gallery; cells and observed: (30, 30)."""
+    """One picture of a gallery, with what it can be found by.
+
+    Attributes:
+        cells: (30, 30), True = occupied.
+        observed: (30, 30), True = seen.
+        origin: `scan` or `map`, or the name of the synthesizer.
+        scenario_id: What it was rebuilt from; empty for a synthesized one, as site and robot.
+        count: By the night's kind of count; None where unknown.
+        is_traversable: The target robot gets from start to goal.
+        is_chosen: The night learns from it, or trained in it.
+    """
 
     environment_id: str
     cells: BoolArray
     observed: BoolArray
-    caption: str = ""
-    detail: str = ""
+    origin: str
+    scenario_id: str = ""
+    site: str = ""
+    robot: str = ""
+    count: float | None = None
+    is_traversable: bool = True
+    is_chosen: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +171,8 @@ class NightReport:
 
     Attributes:
         robot: The robot that everything is for: trained, measured, and able to cross.
-        challenging: Chosen environments, hardest first; the page shows the first ones.
+        recorded: Rebuilt environments: the chosen, hardest first, then the rest of the night's
+            own; the page shows the first ones.
         synthesized: Environments that were trained in.
         pictures: Further pictures: logs over their paths, rendered worlds.
         lineage: What was made from what: names and digests, in order.
@@ -173,7 +189,7 @@ class NightReport:
     waiting_logs: int = 0
     funnel: Funnel | None = None
     sensitivity: Sensitivity | None = None
-    challenging: tuple[ShownEnvironment, ...] = ()
+    recorded: tuple[ShownEnvironment, ...] = ()
     synthesis: SynthesisUse | None = None
     synthesized: tuple[ShownEnvironment, ...] = ()
     training: TrainingUse | None = None

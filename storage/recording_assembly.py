@@ -48,7 +48,7 @@ def assemble_recording(
             poses, used_source = in_map, "map"
     commands = _commands(streams, profile)
     scans = assemble_scans(streams, profile, base)
-    recorded_map = _map(streams, used_source)
+    recorded_map = _map_of_poses(streams, used_source)
     dropped = sum(count for name, count in warnings.items() if name.startswith("dropped_"))
     return Recording(
         poses=poses,
@@ -219,12 +219,18 @@ def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream
     return CommandStream(stamps_ns=stamps[last], commands=clean[last])
 
 
-def _map(streams: CollectedStreams, pose_source: str) -> RecordedMap | None:
+def _map_of_poses(streams: CollectedStreams, pose_source: str) -> RecordedMap | None:
+    """Give the map if it is in the frame of the poses."""
+    if pose_source == "odometry" and streams.map and _odometry_moves_in_map(streams):
+        streams.warnings["map_of_other_frame"] = 1
+        return None
+    return assemble_map(streams)
+
+
+def assemble_map(streams: CollectedStreams) -> RecordedMap | None:
+    """Give the map among the streams; None where there is none that can be used."""
     grid = streams.map
     if grid is None:
-        return None
-    if pose_source == "odometry" and _odometry_moves_in_map(streams):
-        streams.warnings["map_of_other_frame"] = 1
         return None
     yaw = _yaw(grid.orientation)
     usable = np.isfinite((grid.resolution, *grid.position[:2], yaw)).all()

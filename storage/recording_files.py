@@ -71,6 +71,32 @@ def read_recording(directory: Path, *, byte_limit: int) -> Recording:
         raise LogError("decoder_bug", f"decoded log cannot be used: {error}") from error
 
 
+def write_recorded_map(directory: Path, recorded: RecordedMap) -> None:
+    """Write a log's map alone."""
+    header = {
+        "map_resolution": recorded.resolution,
+        "map_origin": _numbers(recorded.origin),
+        "warnings": {},
+    }
+    np.save(directory / "map_cells.npy", recorded.cells, allow_pickle=False)
+    (directory / _HEADER).write_text(json.dumps(header), encoding="utf-8")
+
+
+def read_recorded_map(directory: Path, *, byte_limit: int) -> RecordedMap:
+    """Read a map back, trusting as little as `read_recording`; the cells are copied.
+
+    Raises:
+        LogError: `decoder_bug`: it is not what `write_recorded_map` writes.
+    """
+    try:
+        recorded = _Files(directory, byte_limit).recorded_map()
+    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        raise LogError("decoder_bug", f"decoded map cannot be used: {error}") from error
+    return RecordedMap(
+        cells=recorded.cells.copy(), resolution=recorded.resolution, origin=recorded.origin
+    )
+
+
 def write_tabled_log(directory: Path, log: TabledLog) -> None:
     """Write a log that came as tables: its recording, and where its drives begin and end."""
     write_recording(directory, log.recording)
@@ -119,6 +145,12 @@ class _Files:
             messages_used=int(header["messages_used"]),
             warnings={str(name)[:40]: int(count) for name, count in sorted(warnings.items())},
         )
+
+    def recorded_map(self) -> RecordedMap:
+        recorded = self._map(self._header())
+        if recorded is None:
+            raise ValueError("there is no map")
+        return recorded
 
     def tabled_log(self, recording: Recording) -> TabledLog:
         first_steps = self._array("first_steps", "int64", (None,))

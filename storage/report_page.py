@@ -1,7 +1,7 @@
 """The page of one night: a single HTML file that needs nothing but itself (leaf: matplotlib)."""
 
 import base64
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -11,18 +11,15 @@ from ses_core.evaluation.statistics import Interval
 from ses_core.pictures.evaluation_figure import draw_evaluation, draw_worlds
 from ses_core.pictures.figures import DARK, LIGHT, Theme
 from ses_core.pictures.funnel import funnel_figure
-from ses_core.pictures.gallery import thumbnail
 from ses_core.pictures.learning_curve import draw_learning_curve
 from ses_core.pictures.robot_figure import robot_figure
 from ses_core.pictures.threshold_sensitivity import threshold_sensitivity_figure
 from storage.durable_files import replace_file
-from storage.night_report import NightReport, ShownEnvironment, describe_robot, headline
+from storage.night_report import NightReport, describe_robot, headline
+from storage.place_gallery import gallery_data, gallery_script, script_digest
 
-GALLERY_LIMIT = 200
-"""Most pictures in a gallery, so that the page opens at once; the rest is counted."""
-
-GALLERY_OPENING = 33
-"""Pictures of a gallery that are seen at first; the others unfold."""
+GALLERY_LIMIT = 4000
+"""Most environments in a gallery, so that the page opens at once; the rest is counted."""
 
 
 def write_report(path: Path, report: NightReport) -> None:
@@ -55,15 +52,17 @@ def render_page(report: NightReport) -> str:
         "duration": _duration,
         "thousands": _thousands,
         "picture": _picture,
-        "gallery": _gallery,
+        "gallery_data": gallery_data,
     }
+    script = gallery_script()
     return environment.get_template("night.html").render(
         report=report,
         headline=headline(report),
         robot_words=describe_robot(report.robot),
         pictures=_pictures(report),
         gallery_limit=GALLERY_LIMIT,
-        gallery_opening=GALLERY_OPENING,
+        gallery_script=script,
+        gallery_script_digest=script_digest(script),
     )
 
 
@@ -129,22 +128,6 @@ def _themed_picture(light: bytes, dark: bytes, words: str) -> Markup:
 def _picture(png: bytes, words: str) -> Markup:
     """Embed a PNG drawn on white."""
     return Markup('<div class="sheet"><img src="{}" alt="{}"></div>').format(_data_uri(png), words)
-
-
-def _gallery(environments: Sequence[ShownEnvironment]) -> Markup:
-    """Embed environments as pictures of one pixel per cell, named on hovering."""
-    return Markup("\n").join(
-        Markup(
-            '<figure class="place" title="{}"><span><img src="{}" alt="environment {}"></span>'
-            "<figcaption>{}</figcaption></figure>"
-        ).format(
-            " · ".join(text for text in (shown.environment_id, shown.detail) if text),
-            _data_uri(thumbnail(shown.cells, shown.observed)),
-            shown.environment_id,
-            shown.caption,
-        )
-        for shown in environments
-    )
 
 
 def _data_uri(png: bytes) -> str:

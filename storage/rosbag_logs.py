@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ses_core.errors import LogError
-from ses_core.extraction.recording import Recording
-from ses_core.robot_profile import RobotProfile
+from ses_core.extraction.recording import RecordedMap, Recording
+from ses_core.robot_profile import GENERIC, RobotProfile
 from ses_core.settings import DecoderLimits
 from storage.collected_streams import CollectedStreams
 from storage.message_decoding import KNOWN_TYPES
 from storage.message_types import require_known_definition, ros1_types, ros2_types
-from storage.recording_assembly import assemble_recording
+from storage.recording_assembly import assemble_map, assemble_recording
 from storage.rosbag_containers import OpenRecording, open_recording
 from storage.stream_collection import StreamCollector
 from storage.topic_choice import TopicChoice, choose_topics
@@ -49,6 +49,33 @@ class RosbagLogReader:
                 recording, choice, output_limit=self.limits.output_mib * 2**20
             )
         return assemble_recording(streams, profile=profile, pose_source=pose_source)
+
+
+def read_recorded_map(log: Path, *, limits: DecoderLimits, workdir: Path) -> RecordedMap:
+    """Decode the latest map of a recording and nothing else; only in the limited process.
+
+    Raises:
+        LogError: It cannot be used; `missing_topic`: it has no map.
+    """
+    with open_recording(log, limits=limits, workdir=workdir) as recording:
+        everything = choose_topics(recording.connections, GENERIC, pose_source="odometry")
+        if everything.map is None:
+            raise LogError("missing_topic", "log has no nav_msgs/OccupancyGrid")
+        choice = TopicChoice(
+            scan=None,
+            odometry=None,
+            command=None,
+            pose=None,
+            map=everything.map,
+            transforms=frozenset(),
+            static_transforms=frozenset(),
+        )
+        _require_known(recording, choice)
+        streams = collect_streams(recording, choice, output_limit=limits.output_mib * 2**20)
+    recorded = assemble_map(streams)
+    if recorded is None:
+        raise LogError("bad_values", f"map on {choice.map!r} is empty or has no usable frame")
+    return recorded
 
 
 def _require_known(recording: OpenRecording, choice: TopicChoice) -> None:

@@ -1,7 +1,7 @@
 """Writing real bags, ROS 1 files and ROS 2 folders, for fleets that we simulate."""
 
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -9,6 +9,14 @@ from typing import Any, Literal
 import numpy as np
 import yaml
 from rosbags import rosbag1, rosbag2
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 
 from storage.bag_messages import BagContent, MessageStream, message_streams
 from storage.message_types import ros1_types, ros2_types
@@ -17,6 +25,24 @@ BagFormat = Literal["mcap", "db3", "bag"]
 BagCompression = Literal["none", "file", "message", "storage", "lz4", "bz2"]
 
 _INFORMATION = "rosbag2_bagfile_information"
+
+_LATCHED_TOPICS = frozenset({"/tf_static", "/map", "/path", "/markers"})
+"""Published once: whoever plays the bag back must keep them for those who listen later."""
+
+_FOREVER = QosTime(9223372036, 854775807)
+_LATCHED = (
+    Qos(
+        history=QosHistory.KEEP_LAST,
+        depth=1,
+        reliability=QosReliability.RELIABLE,
+        durability=QosDurability.TRANSIENT_LOCAL,
+        deadline=_FOREVER,
+        lifespan=_FOREVER,
+        liveliness=QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=_FOREVER,
+        avoid_ros_namespace_conventions=False,
+    ),
+)
 
 
 def write_rosbag(
@@ -41,12 +67,12 @@ def write_rosbag(
         return
     streams = list(message_streams(content, "cdr"))
     if split_s is None:
-        _write_ros2(path, streams, format, compression)
+        write_ros2(path, streams, format, compression)
     else:
         _write_parts(path, _split(streams, round(split_s * 1e9)), format, compression)
 
 
-def _write_ros1(path: Path, streams: list[MessageStream], compression: BagCompression) -> None:
+def _write_ros1(path: Path, streams: Sequence[MessageStream], compression: BagCompression) -> None:
     writer = rosbag1.Writer(path)
     if compression != "none":
         writer.set_compression(rosbag1.Writer.CompressionFormat[compression.upper()])
@@ -59,9 +85,10 @@ def _write_ros1(path: Path, streams: list[MessageStream], compression: BagCompre
             writer.write(connections[topic], stamp, message)
 
 
-def _write_ros2(
-    path: Path, streams: list[MessageStream], storage: BagFormat, compression: BagCompression
+def write_ros2(
+    path: Path, streams: Sequence[MessageStream], storage: BagFormat, compression: BagCompression
 ) -> None:
+    """Write streams of CDR messages as a ROS 2 bag: a folder that must not exist."""
     plugin = rosbag2.StoragePlugin.MCAP if storage == "mcap" else rosbag2.StoragePlugin.SQLITE3
     writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
     if compression != "none":
@@ -69,14 +96,19 @@ def _write_ros2(
         writer.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
     with writer:
         connections = {
-            topic: writer.add_connection(topic, message_type, typestore=ros2_types())
+            topic: writer.add_connection(
+                topic,
+                message_type,
+                typestore=ros2_types(),
+                offered_qos_profiles=_LATCHED if topic in _LATCHED_TOPICS else (),
+            )
             for topic, message_type in _topics(streams).items()
         }
         for topic, stamp, message in _in_time_order(streams):
             writer.write(connections[topic], stamp, message)
 
 
-def _split(streams: list[MessageStream], period_ns: int) -> Iterator[list[MessageStream]]:
+def _split(streams: Sequence[MessageStream], period_ns: int) -> Iterator[list[MessageStream]]:
     """Divide streams by time since the first message; topics without messages stay known."""
     first = min(int(stream.stamps_ns[0]) for stream in streams if len(stream.stamps_ns))
     parts = [(stream.stamps_ns - first) // period_ns for stream in streams]
@@ -91,7 +123,7 @@ def _split(streams: list[MessageStream], period_ns: int) -> Iterator[list[Messag
 
 def _write_parts(
     path: Path,
-    parts: Iterable[list[MessageStream]],
+    parts: Iterable[Sequence[MessageStream]],
     storage: BagFormat,
     compression: BagCompression,
 ) -> None:
@@ -102,7 +134,7 @@ def _write_parts(
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as scratch:
         for number, streams in enumerate(parts):
             folder = Path(scratch) / f"{path.name}_{number}"
-            _write_ros2(folder, streams, storage, compression)
+            write_ros2(folder, streams, storage, compression)
             metadata = folder / "metadata.yaml"
             found.append(yaml.safe_load(metadata.read_text(encoding="utf-8"))[_INFORMATION])
             for file in sorted(folder.iterdir()):
@@ -140,12 +172,12 @@ def _merged(parts: list[dict[str, Any]], names: list[str]) -> dict[str, Any]:
     }
 
 
-def _topics(streams: list[MessageStream]) -> dict[str, str]:
+def _topics(streams: Sequence[MessageStream]) -> dict[str, str]:
     """Give each topic's message type; several streams may share one topic."""
     return {stream.topic: stream.message_type for stream in streams}
 
 
-def _in_time_order(streams: list[MessageStream]) -> Iterator[tuple[str, int, bytes]]:
+def _in_time_order(streams: Sequence[MessageStream]) -> Iterator[tuple[str, int, bytes]]:
     """Give (topic, stamp [ns], message) in order of time, earlier streams first when tied."""
     stamps = np.concatenate([stream.stamps_ns for stream in streams])
     owners = np.repeat(np.arange(len(streams)), [len(stream.stamps_ns) for stream in streams])

@@ -15,7 +15,7 @@ SYNTHESIZE = Stage("synthesize", 1)
 RENDER = Stage("render", 1)
 TRAIN = Stage("train", 1)
 EVALUATE = Stage("evaluate", 2)
-REPORT = Stage("report", 1)
+REPORT = Stage("report", 2)
 PRETRAIN = Stage("pretrain", 1)
 DEPLOY = Stage("deploy", 2)
 

@@ -3,17 +3,22 @@
 What a robot may not drive into is occupied: walls, and whatever a map does not know.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO, Literal
 
 import numpy as np
 import yaml
 from PIL import Image, UnidentifiedImageError
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from ses_core.arrays import BoolArray, Float32Array
-from ses_core.errors import WorldError
+from ses_core.errors import NotAMapError, WorldError
+from ses_core.geometry import Pose2D
 from ses_core.navigation import World
 from ses_core.occupancy import OccupancyGrid
+from ses_core.worlds.grids import MOST_CELLS, coarsened, cut_to_free, levelled
 from ses_core.worlds.identity import named_world
 
 IMAGE_SUFFIXES = frozenset({".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff"})
@@ -25,68 +30,83 @@ FREE_THRESHOLD = 0.196
 _UNKNOWN_DARKNESS = 50 / 255
 """Every map saver writes 205 for unknown, which Nav2's usual `free_thresh` of 0.25 calls free."""
 
-_FINEST_M = 0.025
-"""Maps finer than this are coarsened: floor plans of 1 cm pixels would cost 25 times the memory
-and time of 5 cm ones, and no planner cell is finer."""
+OCCUPIED_PERCENT = 50.0
+"""From this occupancy a cell of a `nav_msgs/OccupancyGrid`, or of a map in shades, is occupied."""
 
-_COARSE_M = 0.05
-
-_LARGEST_FILE_MIB = 256
-MOST_CELLS = 64_000_000
+LARGEST_FILE_MIB = 256
 
 
 class _MapServerFile(BaseModel):
-    """The keys of a map_server YAML that decide what is free."""
+    """The keys of a map_server YAML."""
 
     image: str
-    resolution: float = Field(gt=0)
+    resolution: float = Field(gt=0, allow_inf_nan=False)
     origin: tuple[float, float, float]
     negate: int = 0
-    free_thresh: float = FREE_THRESHOLD
+    occupied_thresh: float = Field(0.65, gt=0, le=1)
+    free_thresh: float = Field(FREE_THRESHOLD, ge=0, lt=1)
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "_MapServerFile":
+        if self.free_thresh >= self.occupied_thresh:
+            raise ValueError("free_thresh should be less than occupied_thresh")
+        if not np.isfinite(self.origin).all():
+            raise ValueError("origin should be three finite numbers")
+        return self
 
 
 def read_map_server(path: Path) -> World:
-    """Read a map_server YAML and its image; a turned origin only turns the world as a whole.
+    """Read a map_server YAML and its image, in the frame of the map.
 
     Raises:
         WorldError: A key is missing or wrong, or the image cannot be read.
     """
+    keys = _read_keys(path)
+    picture = path.parent / keys.image
     try:
-        content = yaml.safe_load(read_text(path))
-        keys = _MapServerFile.model_validate(content)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise WorldError(f"{path} is no YAML: {first_line(error)}") from error
-    except ValidationError as error:
-        problem = error.errors()[0]
-        key = ".".join(map(str, problem["loc"])) or "content"
+        pixels = read_pixels(picture)
+    except FileNotFoundError as error:
         raise WorldError(
-            f"{path} is no map_server file: {key}: {problem['msg'].lower()}"
+            f"{path} names the image {keys.image}, expected it at {picture}"
         ) from error
-    darkness = read_darkness(path.parent / keys.image)
-    if keys.negate:
-        darkness = 1.0 - darkness
-    is_unknown = np.abs(darkness - _UNKNOWN_DARKNESS) < 1e-3
-    occupied = (darkness >= keys.free_thresh) | is_unknown
-    grid = _grid_from_picture(path, occupied, keys.resolution, (keys.origin[0], keys.origin[1]))
-    return named_world(path.stem, grid, source="map_server")
+    occupied = _occupied(keys, *pixels)
+    with named_errors(path):
+        grid = levelled(occupied[::-1], keys.resolution, Pose2D(*keys.origin))
+        return named_world(path.stem, cut_to_free(coarsened(grid)), source="map_server")
 
 
-def read_image(path: Path, *, resolution: float) -> World:
+def read_image(path: Path, *, resolution: float, content: IO[bytes] | None = None) -> World:
     """Read an image, light = free, at `resolution` [m per pixel].
+
+    Args:
+        path: Names the world, and is read unless there is `content`.
+        resolution: Edge of a pixel [m].
+        content: What the file holds, where it lies in an archive.
 
     Raises:
         WorldError: It is no image, too large, or nothing in it is free.
     """
-    occupied = read_darkness(path) >= FREE_THRESHOLD
-    return named_world(
-        path.stem, _grid_from_picture(path, occupied, resolution, (0.0, 0.0)), source="image"
-    )
+    lightness, opacity = read_pixels(path, content=content)
+    # What is transparent shows the white paper behind it.
+    occupied = opacity * (1.0 - lightness) >= FREE_THRESHOLD
+    with named_errors(path):
+        grid = OccupancyGrid(cells=occupied[::-1], resolution=resolution)
+        return named_world(path.stem, cut_to_free(coarsened(grid)), source="image")
 
 
-def read_darkness(path: Path) -> Float32Array:
-    """Read how dark an image's pixels (H, W) are: 0 white, 1 black; colours are averaged."""
+def read_pixels(
+    path: Path, *, content: IO[bytes] | None = None
+) -> tuple[Float32Array, Float32Array]:
+    """Read how light an image's pixels (H, W) are, 0 black, 1 white, and how opaque.
+
+    Colours are averaged.
+
+    Raises:
+        WorldError: It is no image, or too large.
+    """
     try:
-        with Image.open(path) as image:
+        with Image.open(content or path) as image:
             if image.width * image.height > MOST_CELLS:
                 raise WorldError(
                     f"{path} has {image.width} x {image.height} pixels, "
@@ -95,42 +115,54 @@ def read_darkness(path: Path) -> Float32Array:
             is_deep, is_grey = image.mode.startswith("I"), image.mode in {"1", "L"}
             wanted = image if is_deep else image.convert("L" if is_grey else "RGBA")
             pixels = np.asarray(wanted, dtype=np.float32)
+    except FileNotFoundError:
+        raise
     except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError) as error:
         raise WorldError(f"{path} cannot be read as an image: {first_line(error)}") from error
-    if is_grey:
-        return 1.0 - pixels / 255.0
-    if is_deep:
-        return 1.0 - pixels / 65535.0
-    # What is transparent shows the white paper behind it.
-    opacity = pixels[..., 3] / 255.0
-    return opacity * (1.0 - pixels[..., :3].mean(axis=2) / 255.0)
+    if is_grey or is_deep:
+        return pixels / (65535.0 if is_deep else 255.0), np.ones_like(pixels)
+    return pixels[..., :3].mean(axis=2) / 255.0, pixels[..., 3] / 255.0
 
 
-def _grid_from_picture(
-    path: Path, occupied: BoolArray, resolution: float, origin: tuple[float, float]
-) -> OccupancyGrid:
-    """Lay a picture, row 0 on top, out as a map, cut down to what is free and one cell around.
+def _read_keys(path: Path) -> _MapServerFile:
+    try:
+        content = yaml.safe_load(read_text(path))
+        if not isinstance(content, dict) or "image" not in content:
+            raise NotAMapError(
+                f"{path} is no map_server file, expected the keys image, resolution and origin"
+            )
+        return _MapServerFile.model_validate(content)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise WorldError(f"{path} is no YAML: {first_line(error)}") from error
+    except ValidationError as error:
+        problem = error.errors()[0]
+        key = ".".join(map(str, problem["loc"])) or "content"
+        said = problem["msg"].removeprefix("Value error, ").lower()
+        raise WorldError(f"{path} is no map_server file: {key}: {said}") from error
 
-    A picture finer than needed is coarsened.
-    """
-    factor = max(1, round(_COARSE_M / resolution)) if resolution < _FINEST_M else 1
-    cells = occupied[::-1]
-    if factor > 1:
-        height, width = (-(-extent // factor) for extent in cells.shape)
-        padded = np.ones((height * factor, width * factor), dtype=np.bool_)
-        padded[: cells.shape[0], : cells.shape[1]] = cells
-        # Occupied if any part is: a thin wall must not leak.
-        cells = np.asarray(padded.reshape(height, factor, width, factor).any(axis=(1, 3)))
-    if cells.all():
-        raise WorldError(f"{path} has no free cell, expected light pixels where it is free")
-    resolution *= factor
-    rows, columns = (np.flatnonzero(~cells.all(axis=axis)) for axis in (1, 0))
-    bottom, left = max(0, rows[0] - 1), max(0, columns[0] - 1)
-    return OccupancyGrid(
-        cells=np.ascontiguousarray(cells[bottom : rows[-1] + 2, left : columns[-1] + 2]),
-        resolution=resolution,
-        origin=(origin[0] + float(left) * resolution, origin[1] + float(bottom) * resolution),
-    )
+
+def _occupied(keys: _MapServerFile, lightness: Float32Array, opacity: Float32Array) -> BoolArray:
+    """Interpret pixels (H, W) as map_server does; what is unknown counts as occupied."""
+    darkness = lightness if keys.negate else 1.0 - lightness
+    if keys.mode == "raw":
+        # The value itself is the percentage, and unknown above 100.
+        percent = np.rint(255.0 * (1.0 - darkness))
+        return (percent >= OCCUPIED_PERCENT) | (opacity < 1.0)
+    is_unknown = np.abs(darkness - _UNKNOWN_DARKNESS) < 1e-3
+    if keys.mode == "trinary":
+        # What is transparent shows the white paper behind it.
+        return (opacity * darkness >= keys.free_thresh) | is_unknown
+    shade = (darkness - keys.free_thresh) / (keys.occupied_thresh - keys.free_thresh)
+    return (shade * 100.0 >= OCCUPIED_PERCENT) | is_unknown | (opacity < 1.0)
+
+
+@contextmanager
+def named_errors(path: Path) -> Iterator[None]:
+    """Say which file it was when something is wrong with what it holds."""
+    try:
+        yield
+    except WorldError as error:
+        raise type(error)(f"{path}: {error}") from error
 
 
 def read_text(path: Path) -> str:
@@ -140,8 +172,8 @@ def read_text(path: Path) -> str:
         WorldError: It is too large, or no UTF-8 text.
     """
     try:
-        if path.stat().st_size > _LARGEST_FILE_MIB << 20:
-            raise WorldError(f"{path} is larger than {_LARGEST_FILE_MIB} MiB")
+        if path.stat().st_size > LARGEST_FILE_MIB << 20:
+            raise WorldError(f"{path} is larger than {LARGEST_FILE_MIB} MiB")
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise WorldError(f"{path} cannot be read as text: {first_line(error)}") from error

@@ -111,9 +111,9 @@ def deploy_fleet(
         found,
         deployments,
         min_distance=settings.evaluation.min_distance_m,
+        preset=settings.evaluation.pair_preset,
         profile=settings.target_robot,
         seed=seed,
-        preset=settings.fleet.pairs,
     )
     return _drive(
         tasks,

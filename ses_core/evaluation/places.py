@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ses_core.evaluation.trials import EvaluationTask, evaluation_task
-from ses_core.navigation import NavigationDomain, World, environment_task
+from ses_core.navigation import NavigationDomain, NavigationTask, World, environment_task
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import EvaluationSettings
 from ses_core.worlds.identity import content_digest
@@ -28,17 +28,22 @@ def sampled_places(
     The pairs of a world depend on its cells and the seed alone, not on the worlds beside it;
     more pairs begin with the same ones.
     """
-    places = []
-    for world in worlds:
-        seed = [settings.seed, int(content_digest(world.grid)[:8], 16)]
-        tasks = sample_tasks(
-            world,
-            settings.pairs,
-            profile=profile,
-            min_distance=settings.min_distance_m,
-            rng=np.random.default_rng(seed),
-        )
-        places += [
-            evaluation_task(one, pair=pair, profile=profile) for pair, one in enumerate(tasks)
-        ]
-    return places
+    return [
+        evaluation_task(task, pair=pair, profile=profile)
+        for world in worlds
+        for pair, task in enumerate(pairs_of(world, settings=settings, profile=profile))
+    ]
+
+
+def pairs_of(
+    world: World, *, settings: EvaluationSettings, profile: RobotProfile
+) -> list[NavigationTask]:
+    """Draw the start-goal pairs of one world."""
+    return sample_tasks(
+        world,
+        settings.pairs,
+        profile=profile,
+        min_distance=settings.min_distance_m,
+        preset=settings.pair_preset,
+        rng=np.random.default_rng([settings.seed, int(content_digest(world.grid)[:8], 16)]),
+    )

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
+from ses_core.arrays import ByteArray, Float32Array
 from ses_core.compilation import compiled_in_place
 from ses_core.planning.costmap import INSCRIBED, LETHAL, RESOLUTION_M
-from ses_core.simulation.state import Memory, Scratch, Slot
+from ses_core.simulation.state import Int32Array, Memory, Scratch, Slot
 
 NEUTRAL_COST = 50.0
 COST_FACTOR = 0.8
@@ -16,9 +17,21 @@ HIGHEST_COST = 253.0
 UNREACHED = np.float32(1e10)
 """Potential where the search has not been."""
 
-_WAVE_STEP = 2.0 * NEUTRAL_COST
+_BUCKET_WIDTH = 0.25 * NEUTRAL_COST
+BUCKETS = 32
+"""What lies ahead of a cell's neighbour is at most a passable cell and a cell's straight way more
+than what lies ahead of the cell: that many buckets are never all in use."""
+
+_STRAIGHT_COST = 0.96 * NEUTRAL_COST
+"""Per cell of straight way. Interpolated potentials come to 4 % less than the true distance in
+between the axes; a heuristic that promises more leads the search over the same cells again."""
+
+_SLACK = LETHAL
+"""How much longer than the shortest way a way may be to be explored: the robot strays."""
+
+_LEAST_STEP = 0.7 * NEUTRAL_COST
+_LEAST_GAIN = 0.01 * NEUTRAL_COST
 _START_RADIUS_CELLS = 7.0
-_SQRT_HALF = math.sqrt(0.5)
 
 
 @compiled_in_place
@@ -51,73 +64,124 @@ def spread_potential(
 ) -> bool:
     """Spread NavFn's potential from the goal until it reaches the robot (its A* form).
 
-    Cells are worked off in waves of rising potential plus straight distance to the robot,
-    each cell interpolating between its two lowest neighbours, as NavFn does.
+    Each cell interpolates between its two lowest neighbours, as in NavFn. But cells are worked
+    off by potential plus straight way to the robot, in steps of a quarter of a free cell and first
+    come, first served: NavFn's three waves pass over the same cells again and again. And only what
+    the last search has reached is forgotten, for a house has half a million cells.
     """
     width, height = slot.map_width, slot.map_height
     potential = memory.potential[slot.map_offset : slot.map_offset + width * height]
-    potential[:] = UNREACHED
+    _forget(slot, potential)
     slot.search_tick = slot.tick
     start = cell_at(slot, slot.x, slot.y)
     goal = _open_cell_near(slot, memory, number, cell_at(slot, slot.goal_x, slot.goal_y), start)
     if goal < 0 or start < 0:
         return False
+    ends, following = scratch.bucket_ends[worker], scratch.following[worker]
     is_pending = scratch.is_pending[worker]
-    is_pending[: width * height] = 0
-    waves = scratch.waves[worker]
-    now, later, over = 0, 1, 2
-    now_size, later_size, over_size = 0, 0, 0
     start_column, start_row = start % width, start // width
-    threshold = LETHAL + NEUTRAL_COST * math.hypot(
-        goal % width - start_column, goal // width - start_row
-    )
+    column, row = goal % width, goal // width
+    slot.reached_left, slot.reached_right = column, column
+    slot.reached_bottom, slot.reached_top = row, row
     potential[goal] = 0.0
-    for neighbour in (goal - 1, goal + 1, goal - width, goal + width):
-        waves[now, now_size] = neighbour
-        is_pending[neighbour] = 1
-        now_size += 1
-    while now_size > 0 or over_size > 0:
-        for k in range(now_size):
-            is_pending[waves[now, k]] = 0
-        for k in range(now_size):
-            cell = waves[now, k]
-            column, row = cell % width, cell // width
+    current = int(_straight_cost(column - start_column, row - start_row) / _BUCKET_WIDTH)
+    _put(ends, following, is_pending, goal, current)
+    empty = 0
+    while empty < BUCKETS and current * _BUCKET_WIDTH <= potential[start] + _SLACK:
+        cell = ends[current % BUCKETS, 0]
+        if cell < 0:
+            current += 1
+            empty += 1
+            continue
+        empty = 0
+        ends[current % BUCKETS, 0] = following[cell]
+        is_pending[cell] = 0
+        value, cell_column, cell_row = potential[cell], cell % width, cell // width
+        for across, up in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+            neighbour = cell + up * width + across
+            if potential[neighbour] <= value + _LEAST_STEP:
+                continue
+            column, row = cell_column + across, cell_row + up
             if column < 1 or row < 1 or column >= width - 1 or row >= height - 1:
                 continue
-            cost = entering_cost(slot, memory, number, cell, start)
-            if cost == 0.0:
+            cost = entering_cost(slot, memory, number, neighbour, start)
+            if cost == 0.0 or not _lower(potential, neighbour, width, cost):
                 continue
-            left, right = potential[cell - 1], potential[cell + 1]
-            below, above = potential[cell - width], potential[cell + width]
-            value = _interpolate(min(left, right), min(below, above), cost)
-            if value >= potential[cell]:
-                continue
-            potential[cell] = value
-            ahead = value + NEUTRAL_COST * math.hypot(column - start_column, row - start_row)
-            gain = value + _SQRT_HALF * cost
-            for neighbour, known in (
-                (cell - 1, left),
-                (cell + 1, right),
-                (cell - width, below),
-                (cell + width, above),
-            ):
-                if known > gain and is_pending[neighbour] == 0:
-                    is_pending[neighbour] = 1
-                    if ahead < threshold:
-                        waves[later, later_size] = neighbour
-                        later_size += 1
-                    else:
-                        waves[over, over_size] = neighbour
-                        over_size += 1
-        now, later = later, now
-        now_size, later_size = later_size, 0
-        if now_size == 0:
-            if potential[start] < UNREACHED:
-                return True
-            threshold += _WAVE_STEP
-            now, over = over, now
-            now_size, over_size = over_size, 0
+            _widen_reach(slot, column, row)
+            if is_pending[neighbour] == 0:
+                ahead = potential[neighbour] + _straight_cost(
+                    column - start_column, row - start_row
+                )
+                bucket = max(int(ahead / _BUCKET_WIDTH), current)
+                _put(ends, following, is_pending, neighbour, bucket)
+    _empty_buckets(ends, following, is_pending)
     return bool(potential[start] < UNREACHED)
+
+
+@compiled_in_place
+def _forget(slot: Slot, potential: Float32Array) -> None:
+    """Take back what the last search has written."""
+    for row in range(slot.reached_bottom, slot.reached_top + 1):
+        first = row * slot.map_width
+        for column in range(slot.reached_left, slot.reached_right + 1):
+            potential[first + column] = UNREACHED
+
+
+@compiled_in_place
+def _widen_reach(slot: Slot, column: int, row: int) -> None:
+    slot.reached_left = min(slot.reached_left, column)
+    slot.reached_right = max(slot.reached_right, column)
+    slot.reached_bottom = min(slot.reached_bottom, row)
+    slot.reached_top = max(slot.reached_top, row)
+
+
+@compiled_in_place
+def _straight_cost(columns: int, rows: int) -> float:
+    """Give the cost of a straight way through free cells."""
+    return _STRAIGHT_COST * math.sqrt(columns * columns + rows * rows)
+
+
+@compiled_in_place
+def _put(
+    ends: Int32Array, following: Int32Array, is_pending: ByteArray, cell: int, bucket: int
+) -> None:
+    """Put a cell into a bucket: a list through `following`, see `Scratch`.
+
+    A cell stays in its bucket when its value falls once more. It is then late by a bucket or
+    two and passes its value on again, which is rare and cheaper than taking it out of the list.
+    """
+    place = bucket % BUCKETS
+    following[cell] = -1
+    if ends[place, 0] < 0:
+        ends[place, 0] = cell
+    else:
+        following[ends[place, 1]] = cell
+    ends[place, 1] = cell
+    is_pending[cell] = 1
+
+
+@compiled_in_place
+def _empty_buckets(ends: Int32Array, following: Int32Array, is_pending: ByteArray) -> None:
+    for bucket in range(BUCKETS):
+        cell = ends[bucket, 0]
+        while cell >= 0:
+            is_pending[cell] = 0
+            cell = following[cell]
+        ends[bucket, 0] = -1
+
+
+@compiled_in_place
+def _lower(potential: Float32Array, cell: int, width: int, cost: float) -> bool:
+    """Lower a cell's potential to what its neighbours allow; tell whether that was worth it."""
+    value = _interpolate(
+        min(potential[cell - 1], potential[cell + 1]),
+        min(potential[cell - width], potential[cell + width]),
+        cost,
+    )
+    if value > potential[cell] - _LEAST_GAIN:
+        return False
+    potential[cell] = value
+    return True
 
 
 @compiled_in_place

@@ -21,6 +21,7 @@ from ses_core.planning.costmap import (
 )
 from ses_core.planning.global_planner import PLAN_CAPACITY
 from ses_core.planning.parameters import PARAMETER_NAMES
+from ses_core.planning.potential import BUCKETS, UNREACHED
 from ses_core.planning.trajectory_planner import MAX_VTHETA_SAMPLES, MAX_VX_SAMPLES
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
@@ -227,6 +228,7 @@ class BatchSimulator:
         slot["inflation_radius"] = -1.0
         slot["outcome"] = EpisodeOutcome.RUNNING
         describe_world(slot, task.world.grid)
+        slot["reached_right"], slot["reached_top"] = -1, -1
         slot["changed_left"], slot["changed_right"] = slot["map_width"], -1
         slot["changed_bottom"], slot["changed_top"] = slot["map_height"], -1
         self._world_keys[number] = id(task.world.grid.cells)
@@ -266,6 +268,7 @@ class BatchSimulator:
         first, size = int(self._slots["map_offset"][number]), int(self._map_sizes[number])
         self._memory.marks[first : first + size] = 0
         self._memory.distances[first : first + size] = 255
+        self._memory.potential[first : first + size] = UNREACHED
         self._memory.costs[number] = 0.0
         self._memory.delayed[number] = 0.0
         if self._is_map_known:
@@ -296,7 +299,8 @@ def _scratch(*, threads: int, largest_map: int) -> Scratch:
     return Scratch(
         queue=np.zeros((threads, WINDOW_SIZE * WINDOW_SIZE), dtype=np.int32),
         columns=np.zeros((threads, _STALE_CELLS + 1, _STALE_CELLS + 2 * FAR_CELLS), dtype=np.int16),
-        waves=np.zeros((threads, 3, largest_map), dtype=np.int32),
+        bucket_ends=np.full((threads, BUCKETS, 2), -1, dtype=np.int32),
+        following=np.zeros((threads, largest_map), dtype=np.int32),
         is_pending=np.zeros((threads, largest_map), dtype=np.uint8),
         samples=np.zeros((threads, MAX_VX_SAMPLES * MAX_VTHETA_SAMPLES)),
     )

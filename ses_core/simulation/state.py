@@ -79,6 +79,10 @@ class Slot(Protocol):
     plan_tick: int  # last tick with a valid plan
     search_tick: int  # last tick the potential was computed
     search_needed: bool
+    reached_left: int  # cells that the search has given a potential
+    reached_right: int
+    reached_bottom: int
+    reached_top: int
     local_goal_x: float
     local_goal_y: float
     inflation_radius: float
@@ -129,8 +133,9 @@ class Scratch(NamedTuple):
 
     queue: Int32Array  # (T, W * W) cells of a breadth-first search
     columns: Int16Array  # (T, H, W) squared distances along columns
-    waves: Int32Array  # (T, 3, largest map) cells of the global planner's three wave fronts
-    is_pending: ByteArray  # (T, largest map)
+    bucket_ends: Int32Array  # (T, 8, 2) first (or -1) and last cell of the global planner's buckets
+    following: Int32Array  # (T, largest map) next cell in the same bucket, or -1
+    is_pending: ByteArray  # (T, largest map) 1 for cells in a bucket
     samples: FloatArray  # (T, S) cost of the local planner's samples
 
 

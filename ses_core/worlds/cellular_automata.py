@@ -41,6 +41,9 @@ COURSE_ORIGIN = (-4.5, 0.0)
 """Lower left corner of the course [m], in the coordinates of BARN's Gazebo files."""
 
 _CORRIDOR_CELLS = 34
+FIELD_START_M = _CORRIDOR_CELLS * CELL_M
+"""Where along y the corridor ends and the field begins [m]."""
+
 _OPEN_CELLS = 30
 COURSE_SHAPE = (_CORRIDOR_CELLS + FIELD_CELLS + _OPEN_CELLS, FIELD_CELLS)
 """Cells of the course along y and x."""

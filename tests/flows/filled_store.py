@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ses_core.settings import IngestSettings, Settings
 from storage.artifact_store import LocalArtifactStore
+from storage.bag_messages import BagContent
 from storage.inbox import scan_inbox
 from storage.inbox_ledger import InboxLedger
 from storage.ingestion import take_in
@@ -16,10 +17,11 @@ from tests.log_factory import drive, write_log
 DAY = date(2026, 11, 22)
 
 
-def fill_store(root: Path, inbox: Path) -> LocalArtifactStore:
+def fill_store(root: Path, inbox: Path, content: BagContent | None = None) -> LocalArtifactStore:
+    """Fill a store with a log; the one by default has a map that shows nothing of its places."""
     folder = inbox / "office" / "r07"
     folder.mkdir(parents=True)
-    write_log(folder, "bag", drive(40.0, speed=0.5))
+    write_log(folder, "bag", content or drive(40.0, speed=0.5))
     (folder / "torn.bag").write_bytes(b"#ROSBAG V2.0\n" + bytes(200))
     store = LocalArtifactStore(root)
     settings = Settings(ingest=IngestSettings(steady_s=0.0))

@@ -52,7 +52,7 @@ def store(tmp_path: Path) -> Path:
         ("status --root /none", "no store at /none", "ses nightly"),
         ("bench nothing", "'nothing'", "increment"),
         ("verify now", "'now'", "nothing more"),
-        ("worlds", "no command", "generate, import, show"),
+        ("worlds", "no command", "import, show, generate"),
         ("worlds import /none --out x", "nothing at /none", "a file or folder"),
         (
             "deploy --worlds / --deployments 1 --out x --format bag --split-seconds 9",

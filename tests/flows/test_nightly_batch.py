@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -129,6 +130,32 @@ def test_the_nights_rows_stand_in_every_table(fleet: Fleet, first: dict[str, Any
     counts = tables["episodes"].groupby(["policy", "simulator"]).size()
     assert counts[first["run_id"], "batch"] == first["evaluation"][0]["trials"]
     assert counts[first["run_id"], "bullet"] == 1
+
+
+def test_the_pages_galleries_hold_every_place_of_the_night(
+    fleet: Fleet, first: dict[str, Any]
+) -> None:
+    tables = read_tables(fleet.root)
+    page = Path(first["report"]).read_text(encoding="utf-8")
+    recorded, trained_in = (
+        json.loads(data)
+        for data in re.findall(r'<script type="application/json">(.*?)</script>', page)
+    )
+    scenarios = tables["scenarios"].set_index("environment_id")
+    whole = scenarios[(scenarios.kind == "scenario") & pd.notna(scenarios.index)]
+    assert sorted(recorded["id"]) == sorted(whole.index)
+    selected = tables["selections"][tables["selections"].run_id == first["run_id"]]
+    chosen = selected.sort_values("rank").environment_id.to_list()
+    assert recorded["id"][: len(chosen)] == chosen
+    assert recorded["chosen"] == [int(one in chosen) for one in recorded["id"]]
+    counts = whole.loc[recorded["id"], "negative_velocity_count"].to_list()
+    assert recorded["count"] == counts
+    sites = [recorded["sites"][number] for number in recorded["site"]]
+    assert sites == whole.loc[recorded["id"], "site"].to_list()
+    places = tables["environments"].set_index("environment_id").loc[recorded["id"]]
+    assert recorded["traversable"] == places.is_traversable.astype(int).to_list()
+    assert recorded["occupied"] == [int(cells.sum()) for cells in places.cells]
+    assert len(trained_in["id"]) == first["environments"]
 
 
 def test_training_changed_weights_and_behaviour(fleet: Fleet, first: dict[str, Any]) -> None:

@@ -52,7 +52,7 @@ def full_night() -> NightReport:
         waiting_logs=1,
         funnel=funnel(pool=64, synthesized=100),
         sensitivity=sensitivity(),
-        challenging=environments(120, origin="c", captioned=True),
+        recorded=environments(120, origin="c", counted=True, chosen=80),
         synthesis=SynthesisUse(
             method_asked="gan",
             method_used="pca",
@@ -179,16 +179,22 @@ def sensitivity() -> Sensitivity:
 
 
 def environments(
-    count: int, *, origin: str, captioned: bool = False
+    count: int, *, origin: str, counted: bool = False, chosen: int | None = None
 ) -> tuple[ShownEnvironment, ...]:
+    """Give environments; counted ones are recorded, in two homes, the first `chosen` chosen."""
     cells = rooms(count, seed=8)
     return tuple(
         ShownEnvironment(
             environment_id=f"{origin}{index:04d}",
             cells=place,
             observed=~np.rot90(place, 2),
-            caption=str(180 - index) if captioned else "",
-            detail="home-3, jackal-7" if captioned else "",
+            origin="scan" if counted else "pca",
+            scenario_id=f"x{index:04d}" if counted else "",
+            site=f"home-{index % 2}" if counted else "",
+            robot="jackal-7" if counted else "",
+            count=float(180 - index) if counted else None,
+            is_traversable=index % 3 != 2 or not counted,
+            is_chosen=chosen is None or index < chosen,
         )
         for index, place in enumerate(cells)
     )

@@ -7,6 +7,7 @@ import pytest
 from ses_core.errors import WorldError
 from ses_core.occupancy import occupied_at
 from ses_core.worlds.cellular_automata import COURSE_GOAL, COURSE_START, barn_course, grow_field
+from ses_core.worlds.mesh_slicing import MeshSlicing
 from storage.gazebo_worlds import read_gazebo_world
 from tests.shared_data import shared_data
 
@@ -60,6 +61,58 @@ def test_turned_boxes_stand_where_model_and_link_put_them(tmp_path: Path) -> Non
     grid = read_gazebo_world(path).grid
     points = np.array([(5.0, 2.0), (5.0, 1.1), (5.0, 2.9), (5.3, 2.0), (5.0, 0.8)])
     assert occupied_at(grid, points, outside=False).tolist() == [True, True, True, False, False]
+
+
+def test_boxes_that_fill_cells_give_just_these_cells(tmp_path: Path) -> None:
+    cells = np.random.default_rng(3).random((12, 17)) < 0.3
+    cells[[0, -1]] = True
+    cells[:, [0, -1]] = True
+    size, boxes = 0.3, []
+    for iy, ix in np.argwhere(cells):
+        x, y = -1.2 + size * (ix + 0.5), 0.6 + size * (iy + 0.5)
+        boxes.append(_box(x, y, 0.0, f"{size} {size} 1"))
+    grid = read_gazebo_world(_write(tmp_path, *boxes), resolution=size).grid
+    assert np.array_equal(grid.cells, cells)
+    assert grid.origin == pytest.approx((-1.2, 0.6))
+
+
+def test_floors_ceilings_and_the_ground_plane_are_in_nobodys_way(tmp_path: Path) -> None:
+    floor = _box(0, 0, 0, "9 9 0.1").replace("<pose>0 0 0 0", "<pose>0 0 -0.05 0")
+    lamp = _box(1, 1, 0, "1 1 0.2").replace("<pose>1 1 0 0", "<pose>1 1 2.2 0")
+    plane = (
+        "<model name='ground_plane'><link name='l'><collision name='c'><geometry><plane>"
+        "<size>9 9</size></plane></geometry></collision></link></model>"
+        "<include><uri>model://sun</uri></include>"
+    )
+    post = _box(2, 2, 0, "0.5 0.5 1")
+    grid = read_gazebo_world(_write(tmp_path, floor, lamp, plane, post)).grid
+    assert grid.cells.shape == (10, 10)
+    assert grid.cells.all()
+    alone = _write(tmp_path, floor, lamp, post)
+    assert read_gazebo_world(alone, slicing=MeshSlicing(low=0.1, high=3.0)).grid.width_m > 1.5
+
+
+def test_spheres_and_nested_models_are_solids_too(tmp_path: Path) -> None:
+    sphere = _cylinder("ball", 1.0, 0.0, radius=0.5).replace("cylinder>", "sphere>")
+    nested = f"<model name='outer'><pose>0 3 0 0 0 0</pose>{sphere}</model>"
+    grid = read_gazebo_world(_write(tmp_path, nested)).grid
+    assert grid.origin == pytest.approx((0.5, 2.5))
+    assert occupied_at(grid, np.array([(1.0, 3.0)]), outside=False).all()
+
+
+@pytest.mark.parametrize(
+    ("models", "said"),
+    [
+        ("<include><uri>model://table</uri></include>", "includes model://table, expected every"),
+        (_box(0, 0, 0, "1 1 1").replace("box>", "mesh>"), "has a mesh in model 'box', expected"),
+        (_box(0, 0, 0, "1 1 1").replace("0 0 0 0 0 0", "0 0 0 0.5 0 0", 1), "tilted by 0.5"),
+        (_box(0, 0, 0, "1 0 1"), "without size"),
+        (_cylinder("a", 0, 0, radius=-1.0), "without size"),
+    ],
+)
+def test_what_cannot_be_seen_from_above_is_refused(tmp_path: Path, models: str, said: str) -> None:
+    with pytest.raises(WorldError, match=said):
+        read_gazebo_world(_write(tmp_path, models))
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,7 @@ def test_hostile_logs_are_refused_for_their_reason(case: str, tmp_path: Path) ->
     output = tmp_path / "output"
     output.mkdir()
     request: Mapping[str, object] = {
+        "wanted": "recording",
         "log": str(path),
         "format": name,
         "profile": GENERIC.model_dump(mode="json"),

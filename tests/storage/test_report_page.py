@@ -1,11 +1,15 @@
 import base64
+import hashlib
 import io
+import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -26,6 +30,8 @@ class Page(HTMLParser):
         self.open: list[str] = []
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.text = ""
+        self.scripts: list[str] = []
+        self.galleries: list[dict[str, Any]] = []
         self.feed(html)
         self.close()
         assert self.open == []
@@ -40,7 +46,12 @@ class Page(HTMLParser):
         self.text += " "
 
     def handle_data(self, data: str) -> None:
-        if self.open[-1:] != ["style"]:
+        if self.open[-1:] == ["script"]:
+            if self.tags[-1][1].get("type") == "application/json":
+                self.galleries.append(json.loads(data))
+            else:
+                self.scripts.append(data)
+        elif self.open[-1:] != ["style"]:
             self.text += data + (" " if self.open[-1:] == ["td"] else "")
 
     def images(self) -> list[bytes]:
@@ -65,7 +76,7 @@ def test_page_needs_nothing_but_itself(night: Callable[[], NightReport]) -> None
         for name in ("src", "href", "srcset"):
             if name in attributes:
                 assert str(attributes[name]).startswith("data:")
-    assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", html)
+    assert "//" not in re.sub(r"base64,[A-Za-z0-9+/=]+|\n *//.*|\"cells\":\"[^\"]*\"", "", html)
     assert "@import" not in html
     assert "url(" not in html
 
@@ -75,27 +86,47 @@ def test_equal_reports_give_equal_pages() -> None:
 
 
 def test_names_of_logs_and_robots_are_text_and_never_markup(full_page: Page) -> None:
-    assert not [tag for tag, _ in full_page.tags if tag == "script"]
+    assert len(full_page.scripts) == 1
     assert "<script>alert('log')</script>.bag" in full_page.text
     assert 'jackal"7' in full_page.text
 
 
-def test_hostile_identities_cannot_leave_their_attribute() -> None:
-    hostile = '"><script>x()</script>'
+def test_hostile_identities_cannot_leave_their_data() -> None:
+    hostile = "\"></script><script>x()</script><!-- '&\u2028"
     shown = tuple(
-        replace(item, environment_id=hostile, detail=hostile, caption=hostile)
+        replace(
+            item,
+            environment_id=hostile,
+            scenario_id=hostile,
+            site=hostile,
+            robot=hostile,
+            origin=hostile,
+        )
         for item in environments(2, origin="h")
     )
-    page = Page(render_page(replace(quiet_night(), challenging=shown)))
-    assert not [tag for tag, _ in page.tags if tag == "script"]
-    titles = [attributes["title"] for tag, attributes in page.tags if tag == "figure"]
-    assert titles == [f"{hostile} · {hostile}"] * 2
+    html = render_page(replace(quiet_night(), recorded=shown))
+    page = Page(html)
+    assert len(page.scripts) == 1
+    assert "x()" not in page.text
+    (data,) = page.galleries
+    assert data["id"] == [hostile] * 2
+    assert data["sites"] == data["robots"] == data["origins"] == [hostile]
+
+
+def test_only_the_page_s_own_script_may_run(full_page: Page) -> None:
+    (policy,) = [
+        str(attributes["content"])
+        for tag, attributes in full_page.tags
+        if tag == "meta" and attributes.get("http-equiv") == "Content-Security-Policy"
+    ]
+    digest = base64.b64encode(hashlib.sha256(full_page.scripts[0].encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy
+    assert "default-src 'none'" in policy
 
 
 def test_every_picture_is_a_whole_png(full_page: Page) -> None:
     images = full_page.images()
-    # Two galleries and six figures.
-    assert len(images) == 120 + 100 + 6
+    assert len(images) == 6
     for content in images:
         with Image.open(io.BytesIO(content)) as image:
             image.load()
@@ -108,11 +139,19 @@ def test_every_figure_has_a_twin_for_dark_pages(full_page: Page) -> None:
     assert {item["media"] for item in sources} == {"(prefers-color-scheme: dark)"}
 
 
-def test_places_are_named_on_hovering_and_carry_their_count(full_page: Page) -> None:
-    titles = [str(attributes["title"]) for tag, attributes in full_page.tags if tag == "figure"]
-    assert titles[0] == "c0000 · home-3, jackal-7"
-    assert titles[120] == "s0000"
-    assert "180" in full_page.text
+def test_galleries_hold_every_place_cell_for_cell(full_page: Page) -> None:
+    night = full_night()
+    for data, shown in zip(full_page.galleries, (night.recorded, night.synthesized), strict=True):
+        packed = np.frombuffer(base64.b64decode(data["cells"]), dtype=np.uint8)
+        planes = np.unpackbits(packed.reshape(len(shown), 2, 113), axis=2)[:, :, :900]
+        squares = planes.reshape(-1, 2, 30, 30).astype(bool)
+        assert np.array_equal(squares[:, 0], [item.cells for item in shown])
+        assert np.array_equal(squares[:, 1], [item.observed for item in shown])
+        assert data["id"] == [item.environment_id for item in shown]
+        assert data["count"] == [item.count for item in shown]
+        assert data["chosen"] == [int(item.is_chosen) for item in shown]
+        assert [data["sites"][number] for number in data["site"]] == [item.site for item in shown]
+    assert full_page.galleries[0]["words"] == "steps with v < 0"
 
 
 def test_table_shows_what_the_paper_shows_and_what_it_leaves_out(full_page: Page) -> None:
@@ -193,10 +232,17 @@ def test_an_evaluation_without_worlds_says_that_nothing_was_measured() -> None:
 
 
 def test_a_long_gallery_is_cut_and_counted() -> None:
-    many = environments(GALLERY_LIMIT + 40, origin="c")
-    page = Page(render_page(replace(quiet_night(), challenging=many)))
-    assert len(page.images()) == GALLERY_LIMIT
-    assert f"{GALLERY_LIMIT} of {GALLERY_LIMIT + 40}" in page.text
+    few = environments(50, origin="c", counted=True)
+    many = tuple(
+        replace(few[index % 50], environment_id=f"e{index:015d}")
+        for index in range(GALLERY_LIMIT + 40)
+    )
+    html = render_page(replace(quiet_night(), recorded=many))
+    page = Page(html)
+    (data,) = page.galleries
+    assert len(data["id"]) == GALLERY_LIMIT
+    assert f"{GALLERY_LIMIT:,} of {GALLERY_LIMIT + 40:,}" in page.text
+    assert len(html) < 1_600_000
 
 
 def test_a_full_page_stays_small(tmp_path: Path) -> None:

@@ -1,7 +1,10 @@
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
 from ses_core.arrays import ByteArray
@@ -11,6 +14,7 @@ from storage.world_files import read_image, read_map_server
 from tests.shared_data import shared_data
 
 FREE, WALL, UNKNOWN = 254, 0, 205
+MAP = "image: floor.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n"
 
 
 def _picture() -> ByteArray:
@@ -57,10 +61,13 @@ def test_a_negated_map_reads_dark_as_free(tmp_path: Path) -> None:
     [
         ("image: floor.pgm\norigin: [0, 0, 0]\n", "resolution: field required"),
         ("image: floor.pgm\nresolution: -1\norigin: [0, 0, 0]\n", "greater than 0"),
-        ("image: gone.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n", "cannot be read as an image"),
-        ("- a\n- b\n", "content: input should be"),
+        ("image: gone.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n", "names the image gone.pgm"),
+        (MAP + "occupied_thresh: 0.1\n", "free_thresh should be less"),
+        (MAP + "mode: shaded\n", "mode: input should be"),
+        ("image: floor.pgm\nresolution: 1\norigin: [0, .nan, 0]\n", "three finite numbers"),
+        ("- a\n- b\n", "expected the keys image"),
         ("{", "is no YAML"),
-        ("a: &a [*a]\n", "image: field required"),
+        ("a: &a [*a]\n", "expected the keys image"),
         ("[" * 2000, "is no YAML"),
     ],
 )
@@ -101,10 +108,91 @@ def test_a_fine_plan_is_coarsened_without_losing_a_thin_wall(tmp_path: Path) -> 
 def test_an_image_without_free_ground_or_that_is_none_is_refused(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((5, 5), dtype=np.uint8)).save(tmp_path / "dark.png")
     (tmp_path / "fake.png").write_bytes(b"\x89PNG\r\n\x1a\nnothing")
-    with pytest.raises(WorldError, match="no free cell"):
+    with pytest.raises(WorldError, match="no cell is free"):
         read_image(tmp_path / "dark.png", resolution=0.1)
     with pytest.raises(WorldError, match="cannot be read as an image"):
         read_image(tmp_path / "fake.png", resolution=0.1)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    shape=st.tuples(st.integers(3, 12), st.integers(3, 12)),
+    resolution=st.sampled_from([0.03, 0.05, 0.1]),
+    image=st.sampled_from(["pgm", "png"]),
+    negate=st.booleans(),
+    turns=st.sampled_from([0, 1, 2, 3, -1]),
+)
+@settings(deadline=None, max_examples=40)
+def test_a_map_written_as_map_savers_do_reads_back_cell_for_cell(
+    tmp_path_factory: pytest.TempPathFactory,
+    seed: int,
+    shape: tuple[int, int],
+    resolution: float,
+    image: str,
+    negate: bool,
+    turns: int,
+) -> None:
+    folder = tmp_path_factory.mktemp("map")
+    rng = np.random.default_rng(seed)
+    cells = np.ones(shape, dtype=np.bool_)
+    cells[1:-1, 1:-1] = rng.random((shape[0] - 2, shape[1] - 2)) < 0.4
+    cells[1, 1] = False
+    shades = np.where(cells, WALL, FREE).astype(np.uint8)
+    shades = np.where(cells & (rng.random(shape) < 0.3), UNKNOWN, shades).astype(np.uint8)
+    written = np.where(negate, 255 - shades, shades).astype(np.uint8)[::-1]
+    Image.fromarray(written).save(folder / f"map.{image}")
+    x, y, yaw = -3.5, 7.25, turns * math.pi / 2
+    (folder / "map.yaml").write_text(
+        f"image: map.{image}\nresolution: {resolution}\norigin: [{x}, {y}, {yaw}]\n"
+        f"negate: {int(negate)}\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    grid = read_map_server(folder / "map.yaml").grid
+    # Every cell's middle in the frame of the map, and whether it was free.
+    iy, ix = np.indices(shape)
+    along, across = (ix + 0.5) * resolution, (iy + 0.5) * resolution
+    points = np.column_stack(
+        (
+            (x + math.cos(yaw) * along - math.sin(yaw) * across).ravel(),
+            (y + math.sin(yaw) * along + math.cos(yaw) * across).ravel(),
+        )
+    )
+    assert np.array_equal(occupied_at(grid, points), cells.ravel())
+    assert np.count_nonzero(~grid.cells) == np.count_nonzero(~cells)
+
+
+def test_a_map_at_an_angle_is_laid_out_along_its_frames_axes(tmp_path: Path) -> None:
+    pixels = np.full((40, 60), WALL, dtype=np.uint8)
+    pixels[1:-1, 1:-1] = FREE
+    path = _write_map(tmp_path, pixels=pixels)
+    path.write_text(path.read_text().replace("[-1.0, 2.0, 0.0]", "[1.0, 2.0, 0.5]"))
+    grid = read_map_server(path).grid
+    away = np.array([(3.0, 2.0), (0.3, 0.3), (5.7, 3.7), (-0.5, 2.0), (6.5, 2.0), (3.0, 4.5)])
+    turned = away @ np.array([(math.cos(0.5), math.sin(0.5)), (-math.sin(0.5), math.cos(0.5))])
+    expected = [False, False, False, True, True, True]
+    assert occupied_at(grid, turned + np.array((1.0, 2.0))).tolist() == expected
+    assert np.count_nonzero(~grid.cells) == pytest.approx(38 * 58, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("mode", "free"),
+    [
+        # trinary: below free_thresh; scale: the lighter half between the thresholds.
+        ("trinary", [True, True, False, False, False, False]),
+        ("scale", [True, True, True, False, False, False]),
+        # raw: the value is the percentage itself.
+        ("raw", [False, False, False, False, False, True]),
+    ],
+)
+def test_the_mode_of_a_map_decides_what_its_shades_mean(
+    tmp_path: Path, mode: str, free: list[bool]
+) -> None:
+    shades = np.array([255, 220, 180, 120, 60, 30], dtype=np.uint8)
+    pixels = np.full((3, 8), shades[3] if mode != "raw" else 255, dtype=np.uint8)
+    pixels[1, 1:7] = shades
+    path = _write_map(tmp_path, extra=f"mode: {mode}\nfree_thresh: 0.2\n", pixels=pixels)
+    grid = read_map_server(path).grid
+    points = np.column_stack((-1.0 + 0.1 * (np.arange(6) + 1.5), np.full(6, 2.15)))
+    assert (~occupied_at(grid, points)).tolist() == free
 
 
 def test_a_real_map_keeps_only_what_was_explored() -> None:

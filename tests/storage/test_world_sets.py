@@ -10,6 +10,7 @@ from ses_core.navigation import World
 from ses_core.worlds.cellular_automata import generate_barn
 from ses_core.worlds.homes import generate_homes
 from storage.world_sets import find_worlds, read_worlds, write_world_set
+from storage.world_sources import Reading
 from tests.shared_data import shared_data
 
 
@@ -57,7 +58,7 @@ def test_folders_of_images_are_read_by_number_and_the_rest_is_passed_over(tmp_pa
         _draw(tmp_path / f"model{number}.png", free=1 + number % 3)
     (tmp_path / "README.md").write_text("about")
     (tmp_path / "index.csv").write_text("a,b\n")
-    found = find_worlds([tmp_path], resolution=0.1)
+    found = find_worlds([tmp_path], reading=Reading(resolution=0.1))
     assert [world.name for world in found.worlds] == ["model1", "model2", "model10"]
     assert [path.name for path in found.passed_over] == ["README.md", "index.csv"]
 

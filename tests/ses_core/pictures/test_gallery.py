@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ses_core.pictures.figures import DARK, LIGHT
-from ses_core.pictures.gallery import contact_sheet, thumbnail
+from ses_core.pictures.figures import LIGHT
+from ses_core.pictures.gallery import contact_sheet, packed_places
 from tests.ses_core.synthesis.places import rooms
 
 
@@ -17,23 +17,14 @@ def color(text: str) -> tuple[int, ...]:
     return tuple(bytes.fromhex(text[1:]))
 
 
-@pytest.mark.parametrize("theme", [LIGHT, DARK])
-def test_thumbnail_has_one_pixel_per_cell_with_the_goal_on_top(theme: object) -> None:
-    chosen = DARK if theme is DARK else LIGHT
-    cells = np.zeros((30, 30), dtype=np.bool_)
-    cells[0, 3] = cells[29, 29] = True
-    observed = np.ones((30, 30), dtype=np.bool_)
-    observed[10, :5] = observed[0, 3] = False
-    image = pixels(thumbnail(cells, observed, theme=chosen))
-    assert image.shape == (30, 30, 3)
-    assert np.array_equal((image == color(chosen.occupied)).all(axis=2), cells)
-    assert np.array_equal((image == color(chosen.unknown)).all(axis=2), ~observed & ~cells)
-    assert np.array_equal((image == color(chosen.free)).all(axis=2), observed & ~cells)
-
-
-def test_thumbnail_is_tiny() -> None:
-    noise = np.random.default_rng(0).random((2, 30, 30)) < 0.5
-    assert len(thumbnail(noise[0], noise[1])) < 500
+def test_packed_places_unpack_to_their_cells() -> None:
+    noise = np.random.default_rng(0).random((2, 5, 30, 30)) < 0.5
+    packed = np.frombuffer(packed_places(noise[0], noise[1]), dtype=np.uint8)
+    assert len(packed) == 5 * 226
+    bits = np.unpackbits(packed.reshape(5, 2, 113), axis=2)
+    assert not bits[:, :, 900:].any()
+    assert np.array_equal(bits[:, 0, :900].reshape(5, 30, 30), noise[0])
+    assert np.array_equal(bits[:, 1, :900].reshape(5, 30, 30), noise[1])
 
 
 def test_contact_sheet_shows_every_environment_in_its_place() -> None:

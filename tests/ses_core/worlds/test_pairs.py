@@ -1,6 +1,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -9,7 +10,7 @@ from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import JACKAL
 from ses_core.worlds.cellular_automata import COURSE_GOAL, COURSE_START, generate_barn_world
 from ses_core.worlds.identity import named_world
-from ses_core.worlds.pairs import sample_tasks, standing_places
+from ses_core.worlds.pairs import farthest_apart, sample_tasks, standing_places
 
 
 def _two_rooms(*, door_cells: int) -> World:
@@ -67,14 +68,30 @@ def test_a_world_without_two_places_far_enough_apart_has_no_pair() -> None:
     assert len(standing_places(full.grid, JACKAL).points) == 0
 
 
-def test_long_pairs_span_half_the_world() -> None:
+def test_long_pairs_are_nearly_as_far_apart_as_any() -> None:
     world = _two_rooms(door_cells=24)
+    places = standing_places(world.grid, JACKAL)
+    farthest = max(
+        float(np.linalg.norm(region - place, axis=1).max())
+        for number in np.unique(places.regions)
+        for region in [places.points[places.regions == number]]
+        for place in region
+    )
+    assert farthest_apart(places) == pytest.approx(farthest, rel=1e-3)
     tasks = sample_tasks(world, 20, profile=JACKAL, rng=np.random.default_rng(2), preset="long")
-    diagonal = float(np.linalg.norm(np.ptp(standing_places(world.grid, JACKAL).points, axis=0)))
-    for task in tasks:
-        distance = math.hypot(task.goal[0] - task.start.x, task.goal[1] - task.start.y)
-        assert distance >= max(6.6, 0.5 * diagonal)
-    assert diagonal > 12.0
+    distances = [
+        math.hypot(task.goal[0] - task.start.x, task.goal[1] - task.start.y) for task in tasks
+    ]
+    assert min(distances) >= max(6.6, 0.89 * farthest)
+    assert len(distances) == 20
+
+
+def test_a_wall_between_two_rooms_shortens_long_pairs() -> None:
+    apart, joined = (
+        farthest_apart(standing_places(_two_rooms(door_cells=cells).grid, JACKAL))
+        for cells in (0, 24)
+    )
+    assert apart < 0.7 * joined
 
 
 def test_a_world_with_a_course_has_that_one_pair() -> None:
