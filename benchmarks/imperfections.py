@@ -278,10 +278,10 @@ def _message_lag(path: Path, scratch: Path) -> list[Found]:
         kinds = {c.topic: c.msgtype for c in recording.connections}
         topics = frozenset(t for t, kind in kinds.items() if kind in (LASER_SCAN, ODOMETRY))
         layout = ("<4x2I", 0) if recording.ros_version == 1 else ("<2I", 4)
-        for message in recording.messages(topics):
-            second, nanosecond = struct.unpack_from(layout[0], message.content, layout[1])
-            lag = (message.stamp_ns - second * 10**9 - nanosecond) / 1e9
-            lags.setdefault(message.topic, []).append(lag)
+        for connection, stamp_ns, content in recording.messages(topics):
+            second, nanosecond = struct.unpack_from(layout[0], content, layout[1])
+            lag = (stamp_ns - second * 10**9 - nanosecond) / 1e9
+            lags.setdefault(connection.topic, []).append(lag)
     return [
         (f"log time after stamp, {topic}", "s", len(found), np.median(found))
         for topic, found in sorted(lags.items())

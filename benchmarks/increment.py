@@ -15,7 +15,8 @@ from flows.nightly_batch import extract_only, ingest_only
 from ses_core.extraction.recording import CommandStream, PoseStream, ScanStream
 from ses_core.geometry import Pose2D
 from ses_core.settings import IngestSettings, Settings
-from storage.rosbag_writer import BagContent, write_rosbag
+from storage.bag_messages import BagContent
+from storage.rosbag_writer import write_rosbag
 
 OLD_LOGS = 200
 REPETITIONS = 5

@@ -1,5 +1,6 @@
 """A simulated fleet's day: robots drive in worlds, and real logs land in a folder."""
 
+import datetime as dt
 from pathlib import Path
 
 from prefect import flow
@@ -31,6 +32,7 @@ def deploy(
     part: str | None = None,
     resolution: float | None = None,
     seed: int = 0,
+    date: dt.date | None = None,
     settings: Settings = Settings(),  # noqa: B008  (frozen; the UI shows it as the form's defaults)
 ) -> DeploymentSummary:
     """Let a simulated fleet drive and write its logs as `<site>/<robot>/<log>`.
@@ -45,7 +47,8 @@ def deploy(
         part: Only this part of a folder of worlds, by its `split.csv`.
         resolution: Of images that carry none [m per pixel].
         seed: Of pairs and imperfections.
-        settings: Those of `simulation`, `evaluation` and the target robot matter.
+        date: Day on which it is said to have driven; today by default.
+        settings: Those of `fleet`, `simulation`, `evaluation`, `ingest` and `target_robot` matter.
     """
     day = deploy_fleet.submit(
         worlds,
@@ -56,6 +59,7 @@ def deploy(
         out=out,
         log_format=format,
         seed=seed,
+        day=date,
         store=LocalArtifactStore(root),
         settings=settings,
     ).result()

@@ -1,5 +1,6 @@
 """`ses worlds generate`, and `ses deploy`: a simulated fleet's day in them."""
 
+from datetime import datetime
 from typing import Annotated, Literal
 
 import typer
@@ -19,6 +20,11 @@ from flows.world_set_commands import answer_worlds, worlds_app
 
 app = typer.Typer()
 app.add_typer(worlds_app)
+
+DateOption = Annotated[
+    datetime | None,
+    typer.Option(formats=["%Y-%m-%d"], metavar="YYYY-MM-DD", help="Day it drove; else today."),
+]
 
 
 @worlds_app.command(epilog="Example: ses worlds generate homes --count 8 --seed 3 --out homes")
@@ -62,22 +68,56 @@ def deploy(
         float | None, typer.Option(metavar="D", help="Least start-goal distance [m].")
     ] = None,
     pair_preset: PairPresetOption = None,
+    robots: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Robots that take turns in a world.")
+    ] = None,
+    drives_per_log: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Drives in one log; 1, in tables 50.")
+    ] = None,
+    split_seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="MCAP and db3: a new file of the log after so long."),
+    ] = None,
+    publish_map: Annotated[
+        bool, typer.Option("--publish-map", help="Record the world as a map, too.")
+    ] = False,
+    odometry_drift: Annotated[
+        float | None,
+        typer.Option(
+            metavar="D",
+            min=0.0,
+            max=0.2,
+            help="Share by which ways and turns are off; 0.01 is real.",
+        ),
+    ] = None,
+    date: DateOption = None,
     simulator: SimulatorOption = None,
     seed: SeedOption = None,
 ) -> None:
     """Let a simulated fleet drive for a day and write its logs as <site>/<robot>/."""
     from flows.prefect_server import embedded_server
+    from ses_core.imperfections import resolve
 
     command = command_context(context)
-    settings = command.settings(
-        given(
-            {
-                "evaluation.simulator": simulator,
-                "evaluation.min_distance_m": min_distance,
-                "evaluation.pair_preset": pair_preset,
-            }
+    if split_seconds is not None and log_format not in ("mcap", "db3"):
+        raise typer.BadParameter(
+            f"found format {log_format}, expected mcap or db3", param_hint="--split-seconds"
         )
+    options = given(
+        {
+            "evaluation.simulator": simulator,
+            "evaluation.min_distance_m": min_distance,
+            "evaluation.pair_preset": pair_preset,
+            "fleet.robots_per_site": robots,
+            "fleet.drives_per_log": drives_per_log,
+            "fleet.split_s": split_seconds,
+            "fleet.publishes_map": publish_map or None,
+        }
     )
+    if odometry_drift is not None:
+        levels = resolve(command.settings({}).simulation.imperfections).model_dump()
+        options["simulation.imperfections"] = {**levels, "odometry_drift": odometry_drift}
+    settings = command.settings(options)
     check_policies(command, [policy], "--policy")
     with embedded_server(command.root):
         from flows.fleet_deployment import deploy as deploy_flow
@@ -92,6 +132,7 @@ def deploy(
             out=out.absolute(),
             format=log_format,
             seed=seed or 0,
+            date=date.date() if date else None,
             settings=settings,
         )
     answer_facts(command, summary.model_dump(mode="json"))

@@ -50,6 +50,22 @@ def compose_all(outer: FloatArray, inner: Pose2D) -> FloatArray:
     )
 
 
+def compose_rows(outer: FloatArray, inner: FloatArray) -> FloatArray:
+    """Compose poses (K, 3) [m, m, rad] row by row."""
+    cosine, sine = np.cos(outer[:, 2]), np.sin(outer[:, 2])
+    x = outer[:, 0] + cosine * inner[:, 0] - sine * inner[:, 1]
+    y = outer[:, 1] + sine * inner[:, 0] + cosine * inner[:, 1]
+    return np.column_stack((x, y, wrap_angles(outer[:, 2] + inner[:, 2])))
+
+
+def inverse_rows(poses: FloatArray) -> FloatArray:
+    """Give the inverse of each pose (K, 3) [m, m, rad]."""
+    cosine, sine = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x = -cosine * poses[:, 0] - sine * poses[:, 1]
+    y = sine * poses[:, 0] - cosine * poses[:, 1]
+    return np.column_stack((x, y, -poses[:, 2]))
+
+
 def inverse(pose: Pose2D) -> Pose2D:
     """Give the pose of the parent frame as seen from `pose`."""
     cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)

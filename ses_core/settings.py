@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from ses_core.fleet_settings import FleetSettings
 from ses_core.imperfections import Imperfections, PresetName
 from ses_core.robot_profile import JACKAL, KNOWN_PROFILES, RobotProfile
 from ses_core.settings_model import SettingsModel
@@ -288,6 +289,7 @@ class Settings(SettingsModel):
     simulation: SimulationSettings = SimulationSettings()
     training: TrainingSettings = TrainingSettings()
     evaluation: EvaluationSettings = EvaluationSettings()
+    fleet: FleetSettings = FleetSettings()
     store: StoreSettings = StoreSettings()
     target_robot: RobotProfile = Field(
         JACKAL, description="The robot that is trained: a profile, or the name of one."

@@ -1,9 +1,13 @@
 """`CollectedStreams`: a bag's messages as decoded, before anything is cleaned."""
 
 from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from storage.message_decoding import FramedTransform, Grid, Odometry, Scan
+import numpy as np
+
+from ses_core.arrays import FloatArray, IntArray
+from storage.message_decoding import Grid, Odometry, Scans, Transforms, Twists
 
 BASE_FRAMES = ("base_link", "base_footprint", "base")
 """What a robot's body is called where neither profile nor odometry says."""
@@ -11,24 +15,45 @@ BASE_FRAMES = ("base_link", "base_footprint", "base")
 
 @dataclass(slots=True)
 class CollectedStreams:
-    """Messages as decoded, in order of log time, with their stamps [ns]."""
+    """Messages as decoded, in blocks of one form each and in no order beyond that."""
 
-    scans: list[tuple[int, Scan]] = field(default_factory=list)
-    odometry: list[tuple[int, Odometry]] = field(default_factory=list)
-    commands: list[tuple[int, tuple[float, float]]] = field(default_factory=list)
-    poses: list[tuple[int, FramedTransform]] = field(default_factory=list)
-    transforms: dict[tuple[str, str], list[tuple[int, FramedTransform]]] = field(
-        default_factory=dict
-    )
+    scans: list[Scans] = field(default_factory=list)
+    odometry: list[Odometry] = field(default_factory=list)
+    commands: list[Twists] = field(default_factory=list)
+    poses: list[Transforms] = field(default_factory=list)
+    transforms: dict[tuple[str, str], list[Transforms]] = field(default_factory=dict)
     static_edges: set[tuple[str, str]] = field(default_factory=set)
     map: Grid | None = None
-    transform_messages: int = 0
     messages_in: int = 0
     warnings: Counter[str] = field(default_factory=Counter)
 
-    def add_transform(self, stamp: int, transform: FramedTransform, *, is_static: bool) -> None:
-        """Keep a transform with those between the same frames."""
-        edge = (transform.frame, transform.child)
-        self.transforms.setdefault(edge, []).append((stamp, transform))
-        if is_static:
-            self.static_edges.add(edge)
+    def add_transforms(self, transforms: Iterable[Transforms], *, is_static: bool) -> None:
+        """Keep transforms with those between the same frames."""
+        for found in transforms:
+            edge = (found.frame, found.child)
+            self.transforms.setdefault(edge, []).append(found)
+            if is_static:
+                self.static_edges.add(edge)
+
+    def add_map(self, grid: Grid) -> None:
+        """Keep a map if it is the last so far."""
+        self.warnings["dropped_older_map"] += self.map is not None
+        if self.map is None or grid.stamp_ns >= self.map.stamp_ns:
+            self.map = grid
+
+
+def by_time(
+    stamps: Sequence[IntArray], *columns: Sequence[FloatArray]
+) -> tuple[IntArray, list[FloatArray]]:
+    """Put the blocks of a stream together in order of time; equal stamps as they came.
+
+    Args:
+        stamps: Of each block, (K,) [ns].
+        columns: For each column its blocks (K, N).
+    """
+    joined = np.concatenate(stamps)
+    blocks = [np.concatenate(column) for column in columns]
+    if np.all(np.diff(joined) >= 0):
+        return joined, blocks
+    order = np.argsort(joined, kind="stable")
+    return joined[order], [block[order] for block in blocks]

@@ -66,7 +66,7 @@ def decode_request(request: Mapping[str, object], *, scratch: Path) -> dict[str,
 
 
 def _decode(request: Mapping[str, object], scratch: Path) -> None:
-    """Write what is wanted of the file: its recording, its map, or its triangles."""
+    """Write what is wanted of the file: its recording, its drives, its map, or its triangles."""
     from ses_core.robot_profile import RobotProfile
     from ses_core.settings import DecoderLimits
 
@@ -81,6 +81,12 @@ def _decode(request: Mapping[str, object], scratch: Path) -> None:
         from storage.rosbag_logs import read_recorded_map
 
         write_recorded_map(output, read_recorded_map(file, limits=limits, workdir=scratch))
+    elif request["wanted"] == "tables":
+        # Arrow takes a moment to import, which a bag need not wait for.
+        from storage.recording_files import write_tabled_log
+        from storage.tabled_logs import read_tabled_log
+
+        write_tabled_log(output, read_tabled_log(file, limits=limits))
     else:
         from storage.log_formats import make_reader
         from storage.recording_files import write_recording

@@ -1,47 +1,46 @@
 """A simulated fleet's deployments as the logs a real fleet would have left in an inbox.
 
-One log per deployment, in `<out>/<site>/<robot>/`: a site is a world, its robots take turns.
-The nightly run cannot tell these logs from a robot's.
+Logs lie in `<out>/<site>/<robot>/`: a site is a world, its robots take turns, and a log holds one
+drive or several of a robot's day. The nightly run cannot tell these logs from a robot's.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from ses_core.errors import WorldError
-from ses_core.extraction.recording import CommandStream, PoseStream, Recording, ScanStream
 from ses_core.extraction.resampling import find_cuts, resample, velocity_source
-from ses_core.geometry import Pose2D, to_frame, wrap_angle
+from ses_core.extraction.robot_matching import Identity, profile_of
 from ses_core.navigation import NavigationTask
 from ses_core.recipes import digest_json
-from ses_core.robot_profile import RobotProfile
-from ses_core.settings import IngestSettings
+from ses_core.settings import IngestSettings, Settings
 from ses_core.worlds.deployment import Deployment
+from storage.bag_messages import BagContent
+from storage.deployment_content import content_of
 from storage.durable_files import make_folder, write_if_absent
-from storage.rosbag_writer import BagContent, write_rosbag
+from storage.log_formats import TABLES
+from storage.rosbag_writer import write_rosbag
 from storage.trajectory_tables import LogDescription, write_ingested
+from storage.unwritten_bags import recording_of
 
 FleetFormat = Literal["mcap", "db3", "bag", "tables"]
 
 _DAY_STARTS = time(6, 0, tzinfo=UTC)
-_SPACING = timedelta(seconds=150)
-"""From one start of a robot to its next: a whole episode and a pause."""
+_DRIVES_IN_TABLES = 50
+"""In tables a log holds up to this many drives: files of a few hundred rows are slow to read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FleetLog:
-    """A log that was written: where, for which deployment, with how many messages."""
+    """A log that was written: where, and for which deployments."""
 
     path: Path
-    number: int
+    numbers: tuple[int, ...]
     site: str
     robot: str
-    messages: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,52 +52,137 @@ class _Shift:
     turn: int
 
 
+@dataclass(frozen=True, slots=True)
+class _LogKey:
+    """One log: a robot's n-th of the day."""
+
+    site: str
+    robot: str
+    part: int
+
+
 def write_deployments(
     out: Path,
     deployments: Iterable[Deployment],
     *,
     tasks: Sequence[NavigationTask],
     format: FleetFormat,  # noqa: A002 - the contract's word
-    profile: RobotProfile,
     day: date,
-    robots_per_site: int = 2,
+    settings: Settings,
 ) -> list[FleetLog]:
     """Write deployments of these tasks as they come.
 
-    A log is complete before its `.done` sidecar appears.
+    A log is written when its last drive is over, and is complete before its `.done` sidecar
+    appears. Drives of one world should follow each other: what waits for the rest of its log is
+    kept in memory. If the deployments end early, what they left is written all the same.
 
     Raises:
-        WorldError: A log of that name is already there.
+        WorldError: A log of that name is already there, or ROS 1 bags were to be split.
     """
-    shifts = _shifts(tasks, robot=profile.name, robots_per_site=robots_per_site)
-    return [
-        _write_deployment(
-            out, deployment, shifts[deployment.number], format=format, profile=profile, day=day
+    if settings.fleet.split_s is not None and format not in ("mcap", "db3"):
+        raise WorldError(f"found format {format} to split, expected mcap or db3")
+    shifts = _shifts(
+        tasks,
+        robot=settings.target_robot.name,
+        robots_per_site=settings.fleet.robots_per_site,
+    )
+    writer = _LogWriter(out, format=format, day=day, settings=settings)
+    return list(writer.write(deployments, shifts))
+
+
+class _LogWriter:
+    """Collects the drives of each log, and writes the log when it has them all."""
+
+    def __init__(
+        self,
+        out: Path,
+        *,
+        format: FleetFormat,  # noqa: A002 - the contract's word
+        day: date,
+        settings: Settings,
+    ) -> None:
+        self._out = out
+        self._format: FleetFormat = format
+        self._day = day
+        self._settings = settings
+        fleet = settings.fleet
+        by_default = _DRIVES_IN_TABLES if format == TABLES else 1
+        self._drives_per_log = fleet.drives_per_log or by_default
+        self._spacing = timedelta(seconds=settings.simulation.time_limit_s + fleet.pause_s)
+
+    def write(
+        self, deployments: Iterable[Deployment], shifts: Sequence[_Shift]
+    ) -> Iterator[FleetLog]:
+        expected = Counter(self._key(shift) for shift in shifts)
+        collected: dict[_LogKey, list[Deployment]] = {}
+        try:
+            for deployment in deployments:
+                key = self._key(shifts[deployment.number])
+                drives = collected.setdefault(key, [])
+                drives.append(deployment)
+                if len(drives) == expected[key]:
+                    yield self._write_log(key, collected.pop(key), shifts)
+        finally:
+            for key, drives in collected.items():
+                self._write_log(key, drives, shifts)
+
+    def _key(self, shift: _Shift) -> _LogKey:
+        return _LogKey(shift.site, shift.robot, shift.turn // self._drives_per_log)
+
+    def _write_log(
+        self, key: _LogKey, drives: list[Deployment], shifts: Sequence[_Shift]
+    ) -> FleetLog:
+        drives = sorted(drives, key=lambda deployment: deployment.number)
+        starts = [self._start(shifts[deployment.number]) for deployment in drives]
+        name = f"{starts[0]:%Y-%m-%dT%H-%M-%S}_{drives[0].number:05d}"
+        suffix = ".bag" if self._format == "bag" else ""
+        path = self._out / key.site / key.robot / f"{name}{suffix}"
+        if path.exists():
+            raise WorldError(f"{path} is already there, expected a folder without it")
+        make_folder(path.parent)
+        content = content_of(
+            drives,
+            [round(start.timestamp()) * 10**9 for start in starts],
+            profile=self._settings.target_robot,
+            publishes_map=self._settings.fleet.publishes_map,
         )
-        for deployment in deployments
-    ]
+        if self._format == "tables":
+            identity = Identity(key.site, key.robot)
+            write_tables(path, content, identity, day=self._day, settings=self._settings.ingest)
+        else:
+            write_rosbag(path, content, format=self._format, split_s=self._settings.fleet.split_s)
+        write_if_absent(path.with_name(f"{path.name}.done"), b"")
+        numbers = tuple(deployment.number for deployment in drives)
+        return FleetLog(path=path, numbers=numbers, site=key.site, robot=key.robot)
+
+    def _start(self, shift: _Shift) -> datetime:
+        return datetime.combine(self._day, _DAY_STARTS) + shift.turn * self._spacing
 
 
-def recording_of(deployment: Deployment, *, profile: RobotProfile, start_ns: int) -> Recording:
-    """Give a deployment as what a decoder would read from its bag, beginning at a stamp [ns]."""
-    laser = profile.laser
-    stamps = start_ns + np.rint(deployment.times * 1e9).astype(np.int64)
-    messages = 2 * len(stamps) + len(deployment.commands) + len(deployment.scan_steps) + 2
-    return Recording(
-        poses=PoseStream(stamps_ns=stamps, poses=deployment.odometry, twists=deployment.measured),
-        commands=CommandStream(stamps_ns=stamps[:-1], commands=deployment.commands),
-        scans=ScanStream(
-            stamps_ns=stamps[deployment.scan_steps],
-            ranges=deployment.ranges,
-            angles=np.linspace(laser.angle_min_rad, laser.angle_max_rad, laser.beams),
-            range_max=laser.range_max_m,
-            mount=Pose2D(laser.mount_x_m, laser.mount_y_m, laser.mount_yaw_rad),
-        ),
-        map=None,
-        pose_source="odometry",
-        has_clock=True,
-        messages_in=messages,
-        messages_used=messages,
+def write_tables(
+    path: Path, content: BagContent, identity: Identity, *, day: date, settings: IngestSettings
+) -> None:
+    """Write what ingest would have made of a bag with this content, without the bag."""
+    profile = profile_of(identity, path.name, settings)
+    recording = recording_of(content, profile=profile, pose_source=settings.pose_source)
+    cuts = find_cuts(recording, profile=profile, settings=settings)
+    make_folder(path)
+    description = LogDescription(
+        log_id=digest_json(["deployment", identity.site, identity.robot, path.name]),
+        name=path.name,
+        robot=identity.robot,
+        site=identity.site,
+        format=TABLES,
+        batch_date=day,
+        profile=profile.name,
+        velocity_source=velocity_source(recording, settings),
+    )
+    write_ingested(
+        path,
+        description,
+        recording,
+        resample(recording, profile=profile, settings=settings),
+        cut_counts={"dropouts": int(cuts.is_gap.sum()), "pose_jumps": int(cuts.is_jump.sum())},
     )
 
 
@@ -114,76 +198,7 @@ def _shifts(tasks: Sequence[NavigationTask], *, robot: str, robots_per_site: int
     return shifts
 
 
-def _write_deployment(
-    out: Path,
-    deployment: Deployment,
-    shift: _Shift,
-    *,
-    format: FleetFormat,  # noqa: A002 - the contract's word
-    profile: RobotProfile,
-    day: date,
-) -> FleetLog:
-    site, robot = shift.site, shift.robot
-    start = datetime.combine(day, _DAY_STARTS) + shift.turn * _SPACING
-    name = f"{start:%Y-%m-%dT%H-%M-%S}_{deployment.number:05d}"
-    path = out / site / robot / (f"{name}.bag" if format == "bag" else name)
-    if path.exists():
-        raise WorldError(f"{path} is already there, expected a folder without it")
-    make_folder(path.parent)
-    recording = recording_of(deployment, profile=profile, start_ns=round(start.timestamp()) * 10**9)
-    if format == "tables":
-        _write_tables(path, recording, site=site, robot=robot, profile=profile, day=day)
-    else:
-        write_rosbag(path, _bag_content(deployment, recording), format=format)
-    write_if_absent(path.with_name(f"{path.name}.done"), b"")
-    return FleetLog(
-        path=path,
-        number=deployment.number,
-        site=site,
-        robot=robot,
-        messages=recording.messages_in,
-    )
-
-
-def _bag_content(deployment: Deployment, recording: Recording) -> BagContent:
-    start, goal = deployment.task.start, deployment.task.goal
-    x, y = to_frame(np.array([goal]), start)[0].tolist()
-    bearing = wrap_angle(float(np.arctan2(y, x)))
-    return BagContent(
-        poses=recording.poses,
-        commands=recording.commands,
-        scans=recording.scans,
-        goals=np.array([[x, y, bearing]]),
-        goal_stamps_ns=recording.poses.stamps_ns[:1],
-    )
-
-
-def _write_tables(
-    path: Path, recording: Recording, *, site: str, robot: str, profile: RobotProfile, day: date
-) -> None:
-    """Write what ingest would have made of the bag, without the bag."""
-    settings = IngestSettings()
-    cuts = find_cuts(recording, profile=profile, settings=settings)
-    make_folder(path)
-    description = LogDescription(
-        log_id=digest_json(["deployment", site, robot, path.name]),
-        name=path.name,
-        robot=robot,
-        site=site,
-        format="tables",
-        batch_date=day,
-        profile=profile.name,
-        velocity_source=velocity_source(recording, settings),
-    )
-    write_ingested(
-        path,
-        description,
-        recording,
-        resample(recording, profile=profile, settings=settings),
-        cut_counts={"dropouts": int(cuts.is_gap.sum()), "pose_jumps": int(cuts.is_jump.sum())},
-    )
-
-
 def _plain_name(name: str) -> str:
-    """Keep what every file system and every log's rule for names can bear."""
-    return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
+    """Keep what every file system and every log's rule for names can bear; hidden is none."""
+    plain = "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
+    return f"_{plain[1:]}" if plain.startswith(".") else plain

@@ -1,6 +1,7 @@
 """The inbox: which uploads are new, known, still arriving, or none of ours; and claiming a copy.
 
-An upload is one file, or one folder with a `metadata.yaml` and its parts. Nothing is ever parsed
+An upload is one file, one folder with a `metadata.yaml` and its parts, or one folder of tables.
+Nothing is ever parsed
 under its uploaded name or in its uploaded place: `claim` copies it, while hashing, to a name of
 our own.
 """
@@ -19,12 +20,17 @@ from ses_core.extraction.robot_matching import Identity, identify
 from ses_core.recipes import digest_json
 from ses_core.settings import IngestSettings
 from storage.inbox_ledger import InboxLedger, LedgerEntry
+from storage.log_formats import LOGS_FILE, MAP_FILE, SCANS_FILE, TRAJECTORIES_FILE
 
 LOG_SUFFIXES: Final = (".bag", ".db3", ".mcap", ".log", ".clf", ".log.gz", ".clf.gz")
 """Names that say a file is meant as a log; everything else is passed over."""
 
 METADATA: Final = "metadata.yaml"
 PART_SUFFIXES: Final = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd", ".db3-wal", ".db3-shm")
+TABLE_MARKS: Final = frozenset((LOGS_FILE, TRAJECTORIES_FILE))
+"""A folder that holds both is a log that comes as tables."""
+
+TABLE_FILES: Final = (*sorted(TABLE_MARKS), SCANS_FILE, MAP_FILE)
 _DONE, _CHECKSUM = ".done", ".sha256"
 _POLL_S = 2.0
 
@@ -170,8 +176,8 @@ def _list(inbox: Path, settings: IngestSettings) -> tuple[list[Candidate], int]:
     candidates: list[Candidate] = []
     ignored = 0
     for folder, names in _walk(inbox):
-        if METADATA in names:
-            parts = [name for name in names if name == METADATA or name.endswith(PART_SUFFIXES)]
+        if METADATA in names or set(names) >= TABLE_MARKS:
+            parts = [name for name in names if _is_part(name, is_table=METADATA not in names)]
             candidate = _candidate(inbox, folder, tuple(folder / name for name in parts), settings)
             ignored += len(names) - len(parts)
             candidates.extend([candidate] if candidate else [])
@@ -185,6 +191,12 @@ def _list(inbox: Path, settings: IngestSettings) -> tuple[list[Candidate], int]:
             candidate = _candidate(inbox, path, files, settings)
             candidates.extend([candidate] if candidate else [])
     return sorted(candidates, key=lambda item: item.relative), ignored
+
+
+def _is_part(name: str, *, is_table: bool) -> bool:
+    if is_table:
+        return name in TABLE_FILES
+    return name == METADATA or name.endswith(PART_SUFFIXES)
 
 
 def _walk(inbox: Path) -> Iterator[tuple[Path, list[str]]]:

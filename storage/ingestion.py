@@ -7,14 +7,19 @@ from pathlib import Path
 from typing import Literal
 
 from ses_core.errors import LogError
+from ses_core.extraction.recording import Recording
 from ses_core.extraction.resampling import find_cuts, resample, velocity_source
 from ses_core.extraction.robot_matching import Identity, profile_of
+from ses_core.extraction.tabled_drives import split_drives
+from ses_core.extraction.trajectory import Trajectory
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, settings_json
+from ses_core.robot_profile import RobotProfile
 from ses_core.settings import IngestSettings
 from storage.artifact_store import LocalArtifactStore
 from storage.inbox import Candidate
 from storage.inbox_ledger import InboxLedger, LedgerEntry
-from storage.log_decoder import DECODER_VERSION, decode_log
+from storage.log_decoder import DECODER_VERSION, decode_log, decode_tables
+from storage.log_formats import TABLES
 from storage.materialize import Materialized, materialize
 from storage.quarantine import Quarantine, QuarantinedLog
 from storage.spool import ClaimedLog, RefusedClaimError, claim
@@ -208,15 +213,7 @@ def _materialize(
     }
 
     def build(directory: Path) -> None:
-        recording = decode_log(
-            claimed.payload,
-            format=claimed.format,
-            profile=profile,
-            pose_source=settings.pose_source,
-            limits=settings.limits,
-            workdir=store.layout.staging,
-        )
-        trajectories = resample(recording, profile=profile, settings=settings)
+        recording, trajectories, counts = _decode(claimed, profile, settings, store)
         if not trajectories:
             raise LogError("empty", "no two poses follow each other: there is no drive in the log")
         description = LogDescription(
@@ -229,12 +226,36 @@ def _materialize(
             profile=profile.name,
             velocity_source=velocity_source(recording, settings),
         )
-        cuts = find_cuts(recording, profile=profile, settings=settings)
-        counts = {"dropouts": int(cuts.is_gap.sum()), "pose_jumps": int(cuts.is_jump.sum())}
         write_ingested(directory, description, recording, trajectories, cut_counts=counts)
 
     log = ArtifactRef("log", claimed.log_id)
     return materialize(store, Recipe(INGEST, asked, inputs=(log,)), build, anew=anew)
+
+
+def _decode(
+    claimed: ClaimedLog,
+    profile: RobotProfile,
+    settings: IngestSettings,
+    store: LocalArtifactStore,
+) -> tuple[Recording, list[Trajectory], dict[str, int]]:
+    """Decode a log and put it on the clock; also give how often it was cut, by cause."""
+    workdir = store.layout.staging
+    if claimed.format == TABLES:
+        tabled = decode_tables(claimed.payload, limits=settings.limits, workdir=workdir)
+        drives = split_drives(tabled, profile=profile, settings=settings)
+        # What it was cut by stands among its warnings already.
+        return tabled.recording, drives, {}
+    recording = decode_log(
+        claimed.payload,
+        format=claimed.format,
+        profile=profile,
+        pose_source=settings.pose_source,
+        limits=settings.limits,
+        workdir=workdir,
+    )
+    cuts = find_cuts(recording, profile=profile, settings=settings)
+    counts = {"dropouts": int(cuts.is_gap.sum()), "pose_jumps": int(cuts.is_jump.sum())}
+    return recording, resample(recording, profile=profile, settings=settings), counts
 
 
 def _refuse(

@@ -27,6 +27,8 @@ _ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
+    # Arrow's own pool reserves a gigabyte of addresses at once.
+    "ARROW_DEFAULT_MEMORY_POOL": "system",
 }
 
 

@@ -7,13 +7,15 @@ Whatever a log does to its decoder, it does to a child that is thrown away: the 
 from pathlib import Path
 
 from ses_core.extraction.recording import RecordedMap, Recording
+from ses_core.extraction.tabled_drives import TabledLog
 from ses_core.recipes import JsonValue, settings_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import DecoderLimits
 from storage.limited_process import decoded_in_child
-from storage.recording_files import read_recorded_map, read_recording
+from storage.log_formats import TABLES
+from storage.recording_files import read_recorded_map, read_recording, read_tabled_log_back
 
-DECODER_VERSION = 1
+DECODER_VERSION = 2
 """Raised whenever more logs, or the same logs better, are decoded: refused ones are tried again."""
 
 
@@ -48,6 +50,13 @@ def decode_log(
     }
     with decoded_in_child(log, request, limits=limits, workdir=workdir) as output:
         return read_recording(output, byte_limit=2 * limits.output_mib * 2**20)
+
+
+def decode_tables(log: Path, *, limits: DecoderLimits, workdir: Path) -> TabledLog:
+    """Read a spooled folder of tables in a child process; see `decode_log`."""
+    request: dict[str, JsonValue] = {"wanted": "tables", "format": TABLES}
+    with decoded_in_child(log, request, limits=limits, workdir=workdir) as output:
+        return read_tabled_log_back(output, byte_limit=2 * limits.output_mib * 2**20)
 
 
 def decode_map(

@@ -10,6 +10,13 @@ ROSBAG1: Final = "rosbag1"
 ROSBAG2_SQLITE: Final = "rosbag2-sqlite3"
 ROSBAG2_MCAP: Final = "rosbag2-mcap"
 CARMEN: Final = "carmen"
+TABLES: Final = "tables"
+
+LOGS_FILE: Final = "logs.parquet"
+TRAJECTORIES_FILE: Final = "trajectories.parquet"
+SCANS_FILE: Final = "scans.parquet"
+MAP_FILE: Final = "map.npz"
+"""Files of a log that was taken in, and of one that comes as tables."""
 
 SUFFIXES: Final = {ROSBAG1: ".bag", ROSBAG2_SQLITE: ".db3", ROSBAG2_MCAP: ".mcap"}
 """Suffix a file gets in the spool, whatever it was uploaded as."""

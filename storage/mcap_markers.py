@@ -6,8 +6,8 @@ import numpy as np
 
 from ses_core.arrays import FloatArray, IntArray
 from ses_core.geometry import Pose2D
+from storage.bag_messages import MAP_FRAME
 from storage.message_types import ros2_types
-from storage.rosbag_writer import MAP_FRAME
 
 PATH = "nav_msgs/msg/Path"
 MARKERS = "visualization_msgs/msg/MarkerArray"

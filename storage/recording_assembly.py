@@ -1,6 +1,7 @@
 """From a bag's decoded messages to a clean `Recording`: poses, velocities, scans, mount and map."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,16 +14,18 @@ from ses_core.extraction.stream_cleaning import (
     plausible_twists,
     usable_poses,
 )
-from ses_core.geometry import Pose2D, wrap_angles
+from ses_core.geometry import Pose2D, compose_rows
 from ses_core.robot_profile import RobotProfile
-from storage.collected_streams import BASE_FRAMES, CollectedStreams
-from storage.message_decoding import FramedTransform, Quaternion
+from storage.collected_streams import BASE_FRAMES, CollectedStreams, by_time
+from storage.message_decoding import Transforms
 from storage.scan_assembly import assemble_scans
 
 _UNIT_TOLERANCE = 1e-2
 _SHORTEST_QUATERNION = 0.1
 _OCCUPIED_PERCENT = 50
 _FREE, _OCCUPIED, _UNKNOWN = 0, 1, 2
+_SAME_FRAME = 1e-3
+"""Two frames are one if neither is moved by more than this [m, rad]."""
 
 
 def assemble_recording(
@@ -45,7 +48,7 @@ def assemble_recording(
             poses, used_source = in_map, "map"
     commands = _commands(streams, profile)
     scans = assemble_scans(streams, profile, base)
-    recorded_map = assemble_map(streams)
+    recorded_map = _map_of_poses(streams, used_source)
     dropped = sum(count for name, count in warnings.items() if name.startswith("dropped_"))
     return Recording(
         poses=poses,
@@ -63,8 +66,10 @@ def assemble_recording(
 def _base_frame(streams: CollectedStreams, profile: RobotProfile) -> str:
     if profile.base_frame is not None:
         return profile.base_frame
-    named = Counter(odometry.child for _, odometry in streams.odometry if odometry.child)
-    if named:
+    named: Counter[str] = Counter()
+    for odometry in streams.odometry:
+        named[odometry.child] += len(odometry.stamps_ns) if odometry.child else 0
+    if named.total():
         return named.most_common(1)[0][0]
     frames = {frame for edge in streams.transforms for frame in edge}
     return next((frame for frame in BASE_FRAMES if frame in frames), BASE_FRAMES[0])
@@ -72,10 +77,12 @@ def _base_frame(streams: CollectedStreams, profile: RobotProfile) -> str:
 
 def _odometry(streams: CollectedStreams, profile: RobotProfile, base: str) -> PoseStream:
     if streams.odometry:
-        stamps = np.array([stamp for stamp, _ in streams.odometry], dtype=np.int64)
-        positions = np.array([message.position for _, message in streams.odometry])
-        turns = np.array([message.orientation for _, message in streams.odometry])
-        twists = np.array([message.twist for _, message in streams.odometry])
+        stamps, (positions, turns, twists) = by_time(
+            [block.stamps_ns for block in streams.odometry],
+            [block.positions for block in streams.odometry],
+            [block.orientations for block in streams.odometry],
+            [block.twists for block in streams.odometry],
+        )
         return _pose_stream(streams.warnings, profile, stamps, positions, turns, twists)
     edge = next(
         (
@@ -88,11 +95,8 @@ def _odometry(streams: CollectedStreams, profile: RobotProfile, base: str) -> Po
     if edge is None:
         raise LogError("missing_topic", "log has no odometry, and no transform from odom to base")
     streams.warnings["pose_from_transforms"] = 1
-    found = streams.transforms[edge]
-    stamps = np.array([stamp for stamp, _ in found], dtype=np.int64)
-    positions = np.array([transform.position for _, transform in found])
-    turns = np.array([transform.orientation for _, transform in found])
-    twists = np.full((len(found), 2), np.nan)
+    stamps, (positions, turns) = _transform_columns(streams.transforms[edge])
+    twists = np.full((len(stamps), 2), np.nan)
     # Transforms are counted as messages already: what is dropped here is only a pose.
     return _pose_stream(Counter(), profile, stamps, positions, turns, twists)
 
@@ -148,21 +152,13 @@ def _yaws(
 
 def _poses_in_map(streams: CollectedStreams, odometry: PoseStream, base: str) -> PoseStream | None:
     """Give poses in the map's frame, from transforms or a pose topic; None if absent."""
-    edge = next(
-        (
-            edge
-            for edge in streams.transforms
-            if edge[0].rpartition("/")[2] == "map" and edge[1].rpartition("/")[2] == "odom"
-        ),
-        None,
-    )
-    if edge is not None:
-        stamps, corrections = _planar(streams.transforms[edge])
+    if found := _map_to_odometry(streams):
+        stamps, corrections = _planar(found)
         if len(stamps) == 0:
             return None
         # A correction holds until the next; before the first one, the first.
         latest = np.searchsorted(stamps, odometry.stamps_ns, side="right") - 1
-        poses = _compose_rows(corrections[np.maximum(latest, 0)], odometry.poses)
+        poses = compose_rows(corrections[np.maximum(latest, 0)], odometry.poses)
         return PoseStream(stamps_ns=odometry.stamps_ns, poses=poses, twists=odometry.twists)
     direct = next(
         (
@@ -181,33 +177,36 @@ def _poses_in_map(streams: CollectedStreams, odometry: PoseStream, base: str) ->
     return PoseStream(stamps_ns=stamps, poses=poses, twists=twists)
 
 
-def _planar(found: list[tuple[int, FramedTransform]]) -> tuple[IntArray, FloatArray]:
+def _transform_columns(blocks: Sequence[Transforms]) -> tuple[IntArray, list[FloatArray]]:
+    """Give stamps, positions and quaternions of transforms in order of time."""
+    return by_time(
+        [block.stamps_ns for block in blocks],
+        [block.positions for block in blocks],
+        [block.orientations for block in blocks],
+    )
+
+
+def _planar(blocks: Sequence[Transforms]) -> tuple[IntArray, FloatArray]:
     """Give the usable stamps (K,) [ns] and poses (K, 3) of transforms, in order, none repeated."""
-    stamps = np.array([stamp for stamp, _ in found], dtype=np.int64)
-    positions = np.array([transform.position for _, transform in found]).reshape(-1, 3)
-    turns = np.array([transform.orientation for _, transform in found]).reshape(-1, 4)
+    if not blocks:
+        return np.empty(0, dtype=np.int64), np.empty((0, 3))
+    stamps, (positions, turns) = _transform_columns(blocks)
     yaws, _ = _yaws(turns)
     poses = np.column_stack((positions[:, :2], yaws))
-    order = np.argsort(stamps, kind="stable")
-    order = order[usable_poses(poses[order])]
-    order = order[first_of_each_stamp(stamps[order])]
-    return stamps[order], poses[order]
-
-
-def _compose_rows(outer: FloatArray, inner: FloatArray) -> FloatArray:
-    """Compose poses (K, 3) row by row."""
-    cosine, sine = np.cos(outer[:, 2]), np.sin(outer[:, 2])
-    x = outer[:, 0] + cosine * inner[:, 0] - sine * inner[:, 1]
-    y = outer[:, 1] + sine * inner[:, 0] + cosine * inner[:, 1]
-    return np.column_stack((x, y, wrap_angles(outer[:, 2] + inner[:, 2])))
+    usable = usable_poses(poses)
+    stamps, poses = stamps[usable], poses[usable]
+    fresh = first_of_each_stamp(stamps)
+    return stamps[fresh], poses[fresh]
 
 
 def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream | None:
     if not streams.commands:
         return None
     warnings = streams.warnings
-    stamps = np.array([stamp for stamp, _ in streams.commands], dtype=np.int64)
-    commands = np.array([command for _, command in streams.commands])
+    stamps, (commands,) = by_time(
+        [block.stamps_ns for block in streams.commands],
+        [block.twists for block in streams.commands],
+    )
     if len(stamps) > 1:
         clock = clean_clock(stamps, warnings)
         warnings["dropped_bad_stamp"] += clock.dropped
@@ -218,6 +217,14 @@ def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream
     last = np.append(np.diff(stamps) > 0, True)
     warnings["dropped_repeated_stamp"] += int(np.count_nonzero(~last))
     return CommandStream(stamps_ns=stamps[last], commands=clean[last])
+
+
+def _map_of_poses(streams: CollectedStreams, pose_source: str) -> RecordedMap | None:
+    """Give the map if it is in the frame of the poses."""
+    if pose_source == "odometry" and streams.map and _odometry_moves_in_map(streams):
+        streams.warnings["map_of_other_frame"] = 1
+        return None
+    return assemble_map(streams)
 
 
 def assemble_map(streams: CollectedStreams) -> RecordedMap | None:
@@ -233,13 +240,34 @@ def assemble_map(streams: CollectedStreams) -> RecordedMap | None:
     cells: ByteArray = np.full(grid.data.shape, _FREE, dtype=np.uint8)
     cells[grid.data >= _OCCUPIED_PERCENT] = _OCCUPIED
     cells[grid.data < 0] = _UNKNOWN
-    origin = Pose2D(grid.position[0], grid.position[1], yaw)
+    origin = Pose2D(float(grid.position[0]), float(grid.position[1]), yaw)
     return RecordedMap(cells=cells, resolution=grid.resolution, origin=origin)
 
 
-def _yaw(orientation: Quaternion) -> float:
+def _odometry_moves_in_map(streams: CollectedStreams) -> bool:
+    """Tell whether transforms say that the frame of the odometry is not that of the map."""
+    found = _map_to_odometry(streams)
+    if not found:
+        return False
+    _, corrections = _planar(found)
+    return bool(np.any(np.abs(corrections) > _SAME_FRAME))
+
+
+def _map_to_odometry(streams: CollectedStreams) -> Sequence[Transforms]:
+    """Give the transforms from the map to the odometry; none where the log has none."""
+    return next(
+        (
+            found
+            for (parent, child), found in streams.transforms.items()
+            if parent.rpartition("/")[2] == "map" and child.rpartition("/")[2] == "odom"
+        ),
+        (),
+    )
+
+
+def _yaw(orientation: FloatArray) -> float:
     """Give a heading [rad]; map servers often leave the quaternion at zero, which means none."""
-    if orientation == (0.0, 0.0, 0.0, 0.0):
+    if not orientation.any():
         return 0.0
-    yaws, _ = _yaws(np.array([orientation]))
+    yaws, _ = _yaws(orientation[None])
     return float(yaws[0])

@@ -16,6 +16,7 @@ from ses_core.extraction.recording import (
     Recording,
     ScanStream,
 )
+from ses_core.extraction.tabled_drives import TabledLog
 from ses_core.geometry import Pose2D
 
 _HEADER = "recording.json"
@@ -96,6 +97,26 @@ def read_recorded_map(directory: Path, *, byte_limit: int) -> RecordedMap:
     )
 
 
+def write_tabled_log(directory: Path, log: TabledLog) -> None:
+    """Write a log that came as tables: its recording, and where its drives begin and end."""
+    write_recording(directory, log.recording)
+    for name, array in (
+        ("first_steps", log.first_steps),
+        ("lengths", log.lengths),
+        ("scan_poses", log.scan_poses),
+    ):
+        np.save(directory / f"{name}.npy", array, allow_pickle=False)
+
+
+def read_tabled_log_back(directory: Path, *, byte_limit: int) -> TabledLog:
+    """Read a log that came as tables back; see `read_recording`."""
+    recording = read_recording(directory, byte_limit=byte_limit)
+    try:
+        return _Files(directory, byte_limit).tabled_log(recording)
+    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        raise LogError("decoder_bug", f"decoded log cannot be used: {error}") from error
+
+
 @dataclass(frozen=True, slots=True)
 class _Files:
     directory: Path
@@ -130,6 +151,22 @@ class _Files:
         if recorded is None:
             raise ValueError("there is no map")
         return recorded
+
+    def tabled_log(self, recording: Recording) -> TabledLog:
+        first_steps = self._array("first_steps", "int64", (None,))
+        lengths = self._array("lengths", "int64", (None,))
+        scan_poses = self._array("scan_poses", "float64", (None, 3))
+        scans = 0 if recording.scans is None else len(recording.scans.stamps_ns)
+        total = len(recording.poses.stamps_ns)
+        _require(len(first_steps) == len(lengths) > 0, "uneven drives")
+        _require(bool(np.all(lengths > 0)) and int(lengths.sum()) == total, "uneven drives")
+        follows = first_steps[1:] > first_steps[:-1] + lengths[:-1] - 1
+        _require(first_steps[0] >= 0 and bool(np.all(follows)), "drives overlap")
+        _require(len(scan_poses) == scans, "uneven scan poses")
+        _require(bool(np.isfinite(scan_poses).all()), "scan poses are not finite")
+        return TabledLog(
+            recording=recording, first_steps=first_steps, lengths=lengths, scan_poses=scan_poses
+        )
 
     def _header(self) -> dict[str, Any]:
         sizes = [path.stat().st_size for path in self.directory.iterdir() if path.is_file()]

@@ -1,6 +1,5 @@
-"""Opening a recording in any ROS container, within limits: its topics and ordered messages."""
+"""Opening a recording in any ROS container, within limits: its topics and its messages."""
 
-import heapq
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -8,28 +7,19 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from rosbags import rosbag1, rosbag2
+from rosbags import rosbag2
 from rosbags.interfaces import Connection
 
 from ses_core.errors import LogError
 from ses_core.settings import DecoderLimits
 from storage.bounded_decompression import bound_rosbags, bounded_zstd, inflate_zstd_file
+from storage.raw_messages import RawMessage, Ros1Reader, raw_messages
 from storage.sqlite_guard import recover_wal, require_plain_database
 
 METADATA_LIMIT = 2**20
 """Most bytes of a metadata.yaml: its parser needs seconds per megabyte."""
 
 TOPICS_LIMIT = 10_000
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """One message as recorded: topic, type, log time [ns] and serialized content."""
-
-    topic: str
-    message_type: str
-    stamp_ns: int
-    content: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,36 +35,31 @@ class OpenRecording:
     ros_version: int
     connections: tuple[Connection, ...]
     warnings: dict[str, int]
-    _readers: tuple["rosbag1.Reader | rosbag2.Reader", ...]
+    _parts: tuple[tuple[Ros1Reader | rosbag2.Reader, Path], ...]
     _compressed_messages: bool
     _message_limit: int
 
-    def messages(self, topics: frozenset[str]) -> Iterator[Message]:
-        """Give the messages of some topics in order of log time.
+    def messages(self, topics: frozenset[str]) -> Iterator[RawMessage]:
+        """Give the messages of some topics, part by part, in the order they were written.
 
         Raises:
-            LogError: A message is larger than allowed.
+            LogError: A message is larger than allowed, or a part is not whole.
         """
-        sources = [self._messages_of(reader, topics) for reader in self._readers]
-        merged = heapq.merge(*sources, key=lambda message: message.stamp_ns)
-        for message in merged:
-            if len(message.content) > self._message_limit:
-                raise LogError(
-                    "memory_limit",
-                    f"a message on {message.topic!r} has {len(message.content)} bytes, "
-                    f"expected at most {self._message_limit}",
-                )
-            yield message
-
-    def _messages_of(
-        self, reader: "rosbag1.Reader | rosbag2.Reader", topics: frozenset[str]
-    ) -> Iterator[Message]:
-        wanted = [connection for connection in reader.connections if connection.topic in topics]
-        if not wanted:
-            return
-        for connection, stamp, raw in reader.messages(connections=wanted):
-            content = bounded_zstd(raw) if self._compressed_messages else bytes(raw)
-            yield Message(connection.topic, connection.msgtype, stamp, content)
+        limit = self._message_limit
+        for reader, part in self._parts:
+            wanted = [connection for connection in reader.connections if connection.topic in topics]
+            if not wanted:
+                continue
+            for connection, stamp, content in raw_messages(reader, part, wanted):
+                if self._compressed_messages:
+                    content = bounded_zstd(bytes(content))
+                if len(content) > limit:
+                    raise LogError(
+                        "memory_limit",
+                        f"a message on {connection.topic!r} has {len(content)} bytes, "
+                        f"expected at most {limit}",
+                    )
+                yield connection, stamp, content
 
 
 @contextmanager
@@ -100,7 +85,7 @@ def open_recording(log: Path, *, limits: DecoderLimits, workdir: Path) -> Iterat
             require_plain_database(part, message_limit=message_limit)
     is_ros1 = log.suffix == ".bag"
     with ExitStack() as stack:
-        readers = [rosbag1.Reader(part) if is_ros1 else rosbag2.Reader(part) for part in parts]
+        readers = [Ros1Reader(part) if is_ros1 else rosbag2.Reader(part) for part in parts]
         for reader in readers:
             stack.enter_context(reader)
         connections = tuple(connection for reader in readers for connection in reader.connections)
@@ -119,7 +104,7 @@ def open_recording(log: Path, *, limits: DecoderLimits, workdir: Path) -> Iterat
             ros_version=1 if is_ros1 else 2,
             connections=connections,
             warnings={"maybe_truncated": 1} if log_is_lost else {},
-            _readers=tuple(readers),
+            _parts=tuple(zip(readers, parts, strict=True)),
             _compressed_messages=_mode(metadata) == "message",
             _message_limit=message_limit,
         )

@@ -1,6 +1,5 @@
 """`RosbagLogReader`: ROS 1 and ROS 2 recordings of any container to a `Recording`."""
 
-import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,20 +8,16 @@ from ses_core.extraction.recording import RecordedMap, Recording
 from ses_core.robot_profile import GENERIC, RobotProfile
 from ses_core.settings import DecoderLimits
 from storage.collected_streams import CollectedStreams
-from storage.message_decoding import (
-    KNOWN_TYPES,
-    MessageCursor,
-    decode_grid,
-    decode_odometry,
-    decode_pose,
-    decode_scan,
-    decode_transforms,
-    decode_twist,
-)
+from storage.message_decoding import KNOWN_TYPES
 from storage.message_types import require_known_definition, ros1_types, ros2_types
 from storage.recording_assembly import assemble_map, assemble_recording
-from storage.rosbag_containers import Message, OpenRecording, open_recording
+from storage.rosbag_containers import OpenRecording, open_recording
+from storage.stream_collection import StreamCollector
 from storage.topic_choice import TopicChoice, choose_topics
+
+_BATCH_BYTES = 4 * 2**20
+_BATCH_MESSAGES = 8192
+"""Messages of a topic are decoded together, this many at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +45,9 @@ class RosbagLogReader:
                     "missing_topic", "log has neither odometry nor transforms: nothing says a pose"
                 )
             _require_known(recording, choice)
-            streams = _collect(recording, choice, output_limit=self.limits.output_mib * 2**20)
+            streams = collect_streams(
+                recording, choice, output_limit=self.limits.output_mib * 2**20
+            )
         return assemble_recording(streams, profile=profile, pose_source=pose_source)
 
 
@@ -74,7 +71,7 @@ def read_recorded_map(log: Path, *, limits: DecoderLimits, workdir: Path) -> Rec
             static_transforms=frozenset(),
         )
         _require_known(recording, choice)
-        streams = _collect(recording, choice, output_limit=limits.output_mib * 2**20)
+        streams = collect_streams(recording, choice, output_limit=limits.output_mib * 2**20)
     recorded = assemble_map(streams)
     if recorded is None:
         raise LogError("bad_values", f"map on {choice.map!r} is empty or has no usable frame")
@@ -89,26 +86,37 @@ def _require_known(recording: OpenRecording, choice: TopicChoice) -> None:
             require_known_definition(connection, types, ros_version=recording.ros_version)
 
 
-def _collect(
+def collect_streams(
     recording: OpenRecording, choice: TopicChoice, *, output_limit: int
 ) -> CollectedStreams:
-    """Decode the chosen topics message by message."""
-    collector = _Collector(choice, output_limit=output_limit)
-    is_ros1 = recording.ros_version == 1
+    """Decode the messages of the chosen topics.
+
+    Raises:
+        LogError: They are too many, too large, or most do not have their type's form.
+    """
+    collector = StreamCollector(choice, is_ros1=recording.ros_version == 1)
     types = {
         (connection.topic, connection.msgtype)
         for connection in recording.connections
         if connection.msgtype in KNOWN_TYPES
     }
-    for message in recording.messages(choice.topics()):
-        collector.streams.messages_in += 1
-        if (message.topic, message.message_type) not in types:
-            collector.streams.warnings["dropped_other_type"] += 1
-            continue
-        try:
-            collector.take(message, MessageCursor(message.content, is_ros1=is_ros1))
-        except (struct.error, ValueError, OverflowError):
-            collector.streams.warnings["dropped_malformed"] += 1
+    pending: dict[tuple[str, str], _Pending] = {}
+    total = 0
+    for connection, stamp, content in recording.messages(choice.topics()):
+        key = (connection.topic, connection.msgtype)
+        waiting = pending.get(key)
+        if waiting is None:
+            waiting = pending[key] = _Pending()
+        waiting.stamps.append(stamp)
+        waiting.contents.append(content)
+        waiting.bytes += len(content)
+        if waiting.bytes > _BATCH_BYTES or len(waiting.stamps) >= _BATCH_MESSAGES:
+            total += waiting.bytes
+            _flush(collector, key, pending.pop(key), is_known=key in types)
+        if total > output_limit:
+            raise LogError("memory_limit", f"messages exceed {output_limit} bytes")
+    for key, waiting in pending.items():
+        _flush(collector, key, waiting, is_known=key in types)
     streams = collector.streams
     streams.warnings.update(recording.warnings)
     malformed = streams.warnings["dropped_malformed"]
@@ -121,32 +129,18 @@ def _collect(
 
 
 @dataclass(slots=True)
-class _Collector:
-    """Sorts decoded messages into streams."""
+class _Pending:
+    """Messages of one topic that wait to be decoded together."""
 
-    choice: TopicChoice
-    output_limit: int
-    streams: CollectedStreams = field(default_factory=CollectedStreams)
-    _bytes: int = 0
+    stamps: list[int] = field(default_factory=list)
+    contents: list[bytes | memoryview] = field(default_factory=list)
+    bytes: int = 0
 
-    def take(self, message: Message, cursor: MessageCursor) -> None:
-        self._bytes += len(message.content)
-        if self._bytes > self.output_limit:
-            raise LogError("memory_limit", f"messages exceed {self.output_limit} bytes")
-        streams, choice, stamp = self.streams, self.choice, message.stamp_ns
-        if message.topic == choice.scan:
-            streams.scans.append((stamp, decode_scan(cursor)))
-        elif message.topic == choice.odometry:
-            streams.odometry.append((stamp, decode_odometry(cursor)))
-        elif message.topic == choice.command:
-            streams.commands.append((stamp, decode_twist(cursor, message.message_type)))
-        elif message.topic == choice.pose:
-            streams.poses.append((stamp, decode_pose(cursor)))
-        elif message.topic == choice.map:
-            streams.warnings["dropped_older_map"] += streams.map is not None
-            streams.map = decode_grid(cursor)
-        else:
-            is_static = message.topic in choice.static_transforms
-            for transform in decode_transforms(cursor):
-                streams.add_transform(stamp, transform, is_static=is_static)
-            streams.transform_messages += 1
+
+def _flush(
+    collector: StreamCollector, key: tuple[str, str], waiting: _Pending, *, is_known: bool
+) -> None:
+    if is_known:
+        collector.take(*key, waiting.stamps, waiting.contents)
+    else:
+        collector.pass_over(len(waiting.stamps))

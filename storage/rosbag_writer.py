@@ -1,12 +1,13 @@
 """Writing real bags, ROS 1 files and ROS 2 folders, for fleets that we simulate."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+import yaml
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import (
     Qos,
@@ -17,26 +18,13 @@ from rosbags.interfaces import (
     QosTime,
 )
 
-from ses_core.arrays import FloatArray, IntArray
-from ses_core.extraction.recording import CommandStream, PoseStream, RecordedMap, ScanStream
-from ses_core.geometry import Pose2D
-from storage.message_layouts import (
-    LASER_SCAN,
-    OCCUPANCY_GRID,
-    ODOMETRY,
-    POSE_STAMPED,
-    TRANSFORMS,
-    TWIST,
-    LayoutBuilder,
-    Serialization,
-)
+from storage.bag_messages import BagContent, MessageStream, message_streams
 from storage.message_types import ros1_types, ros2_types
 
 BagFormat = Literal["mcap", "db3", "bag"]
 BagCompression = Literal["none", "file", "message", "storage", "lz4", "bz2"]
 
-MAP_FRAME = "map"
-_ODOM_FRAME, _BASE_FRAME, _LASER_FRAME = "odom", "base_link", "laser"
+_INFORMATION = "rosbag2_bagfile_information"
 
 _LATCHED_TOPICS = frozenset({"/tf_static", "/map", "/path", "/markers"})
 """Published once: whoever plays the bag back must keep them for those who listen later."""
@@ -57,45 +45,13 @@ _LATCHED = (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BagContent:
-    """What one deployment of a robot leaves behind.
-
-    Attributes:
-        poses: Odometry: poses in the odometry frame and measured twists (NaN is written as 0).
-        commands: `cmd_vel`, or None.
-        scans: Laser scans as the laser saw them, its mount on the body among them, or None.
-        map: Published once at the first stamp, or None.
-        map_to_odom: Where the odometry frame lies in the map, published with every pose, or None.
-        goals: (G, 3) [m, m, rad] navigation goals in the odometry frame, or None.
-        goal_stamps_ns: (G,) [ns] when they were set.
-    """
-
-    poses: PoseStream
-    commands: CommandStream | None = None
-    scans: ScanStream | None = None
-    map: RecordedMap | None = None
-    map_to_odom: Pose2D | None = None
-    goals: FloatArray | None = None
-    goal_stamps_ns: IntArray | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class MessageStream:
-    """One topic's messages: serialized rows (K,) at stamps (K,) [ns]."""
-
-    topic: str
-    message_type: str
-    stamps_ns: IntArray
-    rows: NDArray[np.void]
-
-
 def write_rosbag(
     path: Path,
     content: BagContent,
     *,
     format: BagFormat,  # noqa: A002 - the contract's word
     compression: BagCompression = "none",
+    split_s: float | None = None,
 ) -> None:
     """Write a bag; equal content gives equal bytes.
 
@@ -104,11 +60,16 @@ def write_rosbag(
         content: What the bag says.
         format: Container; `bag` is ROS 1, the others ROS 2.
         compression: `file`, `message`, `storage` (MCAP chunks) for ROS 2; `lz4`, `bz2` for ROS 1.
+        split_s: ROS 2: go on in a new file of the folder after so long [s].
     """
     if format == "bag":
         _write_ros1(path, list(message_streams(content, "ros1")), compression)
+        return
+    streams = list(message_streams(content, "cdr"))
+    if split_s is None:
+        write_ros2(path, streams, format, compression)
     else:
-        write_ros2(path, list(message_streams(content, "cdr")), format, compression)
+        _write_parts(path, _split(streams, round(split_s * 1e9)), format, compression)
 
 
 def _write_ros1(path: Path, streams: Sequence[MessageStream], compression: BagCompression) -> None:
@@ -147,6 +108,70 @@ def write_ros2(
             writer.write(connections[topic], stamp, message)
 
 
+def _split(streams: Sequence[MessageStream], period_ns: int) -> Iterator[list[MessageStream]]:
+    """Divide streams by time since the first message; topics without messages stay known."""
+    first = min(int(stream.stamps_ns[0]) for stream in streams if len(stream.stamps_ns))
+    parts = [(stream.stamps_ns - first) // period_ns for stream in streams]
+    for number in np.unique(np.concatenate(parts)).tolist():
+        yield [
+            replace(
+                stream, stamps_ns=stream.stamps_ns[part == number], rows=stream.rows[part == number]
+            )
+            for stream, part in zip(streams, parts, strict=True)
+        ]
+
+
+def _write_parts(
+    path: Path,
+    parts: Iterable[Sequence[MessageStream]],
+    storage: BagFormat,
+    compression: BagCompression,
+) -> None:
+    """Write a folder of several files, as rosbag2 does when it splits."""
+    path.mkdir()
+    names, found = [], []
+    # Hidden: an inbox passes over what is not finished.
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as scratch:
+        for number, streams in enumerate(parts):
+            folder = Path(scratch) / f"{path.name}_{number}"
+            write_ros2(folder, streams, storage, compression)
+            metadata = folder / "metadata.yaml"
+            found.append(yaml.safe_load(metadata.read_text(encoding="utf-8"))[_INFORMATION])
+            for file in sorted(folder.iterdir()):
+                if file != metadata:
+                    file.rename(path / file.name)
+                    names.append(file.name)
+        text = yaml.safe_dump({_INFORMATION: _merged(found, names)}, sort_keys=False)
+        (path / "metadata.yaml").write_text(text, encoding="utf-8")
+
+
+def _merged(parts: list[dict[str, Any]], names: list[str]) -> dict[str, Any]:
+    """Give what `metadata.yaml` says of several files together."""
+    start = min(part["starting_time"]["nanoseconds_since_epoch"] for part in parts)
+    end = max(
+        part["starting_time"]["nanoseconds_since_epoch"] + part["duration"]["nanoseconds"]
+        for part in parts
+    )
+    topics = [dict(topic) for topic in parts[0]["topics_with_message_count"]]
+    for index, topic in enumerate(topics):
+        topic["message_count"] = sum(
+            part["topics_with_message_count"][index]["message_count"] for part in parts
+        )
+    return {
+        **parts[0],
+        "starting_time": {"nanoseconds_since_epoch": start},
+        "duration": {"nanoseconds": end - start},
+        "message_count": sum(part["message_count"] for part in parts),
+        "topics_with_message_count": topics,
+        "relative_file_paths": names,
+        "files": [
+            {**file, "path": name}
+            for part, name in zip(parts, names, strict=True)
+            for file in part["files"]
+        ],
+    }
+
+
 def _topics(streams: Sequence[MessageStream]) -> dict[str, str]:
     """Give each topic's message type; several streams may share one topic."""
     return {stream.topic: stream.message_type for stream in streams}
@@ -160,158 +185,3 @@ def _in_time_order(streams: Sequence[MessageStream]) -> Iterator[tuple[str, int,
     for index in np.argsort(stamps, kind="stable").tolist():
         stream = streams[owners[index]]
         yield stream.topic, int(stamps[index]), stream.rows[rows[index]].tobytes()
-
-
-def message_streams(content: BagContent, serialization: Serialization) -> Iterator[MessageStream]:
-    """Serialize everything a bag says, topic by topic."""
-    start = content.poses.stamps_ns[:1]
-    if content.scans is not None:
-        mount = content.scans.mount
-        rows = _transform_rows(serialization, start, _pose_array(mount), _BASE_FRAME, _LASER_FRAME)
-        yield MessageStream("/tf_static", TRANSFORMS, start, rows)
-    if content.map is not None:
-        yield map_stream(content.map, stamp_ns=int(start[0]), serialization=serialization)
-    if content.map_to_odom is not None:
-        stamps = content.poses.stamps_ns
-        poses = np.repeat(_pose_array(content.map_to_odom), len(stamps), axis=0)
-        rows = _transform_rows(serialization, stamps, poses, MAP_FRAME, _ODOM_FRAME)
-        yield MessageStream("/tf", TRANSFORMS, stamps, rows)
-    rows = _transform_rows(
-        serialization, content.poses.stamps_ns, content.poses.poses, _ODOM_FRAME, _BASE_FRAME
-    )
-    yield MessageStream("/tf", TRANSFORMS, content.poses.stamps_ns, rows)
-    yield MessageStream(
-        "/odom", ODOMETRY, content.poses.stamps_ns, _odometry_rows(serialization, content.poses)
-    )
-    if content.commands is not None:
-        stamps, commands = content.commands.stamps_ns, content.commands.commands
-        yield MessageStream("/cmd_vel", TWIST, stamps, _twist_rows(serialization, commands))
-    if content.scans is not None:
-        rows = _scan_rows(serialization, content.scans)
-        yield MessageStream("/scan", LASER_SCAN, content.scans.stamps_ns, rows)
-    if content.goals is not None and content.goal_stamps_ns is not None:
-        topic = "/move_base_simple/goal" if serialization == "ros1" else "/goal_pose"
-        stamps = content.goal_stamps_ns
-        yield MessageStream(
-            topic, POSE_STAMPED, stamps, _goal_rows(serialization, stamps, content.goals)
-        )
-
-
-def map_stream(
-    recorded: RecordedMap, *, stamp_ns: int, serialization: Serialization
-) -> MessageStream:
-    """Serialize a map, published once, in the frame `map`."""
-    stamps = np.array([stamp_ns], dtype=np.int64)
-    return MessageStream("/map", OCCUPANCY_GRID, stamps, _map_rows(serialization, stamps, recorded))
-
-
-def _odometry_rows(serialization: Serialization, stream: PoseStream) -> NDArray[np.void]:
-    layout = LayoutBuilder(serialization)
-    layout.add_header(_ODOM_FRAME)
-    layout.add_string("child", _BASE_FRAME)
-    layout.add("position", "f8", 3)
-    layout.add("orientation", "f8", 4)
-    layout.add("pose_covariance", "f8", 36)
-    layout.add("linear", "f8", 3)
-    layout.add("angular", "f8", 3)
-    layout.add("twist_covariance", "f8", 36)
-    rows = _stamped(layout, stream.stamps_ns)
-    _set_poses(rows, stream.poses)
-    twists = np.nan_to_num(stream.twists)
-    rows["linear"][:, 0] = twists[:, 0]
-    rows["angular"][:, 2] = twists[:, 1]
-    return rows
-
-
-def _twist_rows(serialization: Serialization, commands: FloatArray) -> NDArray[np.void]:
-    layout = LayoutBuilder(serialization)
-    layout.add("linear", "f8", 3)
-    layout.add("angular", "f8", 3)
-    rows = layout.rows(len(commands))
-    rows["linear"][:, 0] = commands[:, 0]
-    rows["angular"][:, 2] = commands[:, 1]
-    return rows
-
-
-def _scan_rows(serialization: Serialization, scans: ScanStream) -> NDArray[np.void]:
-    beams = len(scans.angles)
-    increment = (scans.angles[-1] - scans.angles[0]) / max(beams - 1, 1)
-    layout = LayoutBuilder(serialization)
-    layout.add_header(_LASER_FRAME)
-    layout.add_constant("angle_min", "f4", scans.angles[0])
-    layout.add_constant("angle_max", "f4", scans.angles[-1])
-    layout.add_constant("angle_increment", "f4", increment)
-    layout.add_constant("time_increment", "f4", 0.0)
-    layout.add_constant("scan_time", "f4", 0.0)
-    layout.add_constant("range_min", "f4", 0.0)
-    layout.add_constant("range_max", "f4", scans.range_max)
-    layout.add_constant("ranges_length", "u4", beams)
-    layout.add("ranges", "f4", beams)
-    layout.add_constant("intensities_length", "u4", 0)
-    rows = _stamped(layout, scans.stamps_ns)
-    rows["ranges"] = scans.ranges
-    return rows
-
-
-def _transform_rows(
-    serialization: Serialization, stamps: IntArray, poses: FloatArray, parent: str, child: str
-) -> NDArray[np.void]:
-    layout = LayoutBuilder(serialization)
-    layout.add_constant("transforms_length", "u4", 1)
-    layout.add_header(parent)
-    layout.add_string("child", child)
-    layout.add("position", "f8", 3)
-    layout.add("orientation", "f8", 4)
-    rows = _stamped(layout, stamps)
-    _set_poses(rows, poses)
-    return rows
-
-
-def _goal_rows(
-    serialization: Serialization, stamps: IntArray, goals: FloatArray
-) -> NDArray[np.void]:
-    layout = LayoutBuilder(serialization)
-    layout.add_header(_ODOM_FRAME)
-    layout.add("position", "f8", 3)
-    layout.add("orientation", "f8", 4)
-    rows = _stamped(layout, stamps)
-    _set_poses(rows, goals)
-    return rows
-
-
-def _map_rows(
-    serialization: Serialization, stamps: IntArray, recorded: RecordedMap
-) -> NDArray[np.void]:
-    height, width = recorded.cells.shape
-    layout = LayoutBuilder(serialization)
-    layout.add_header(MAP_FRAME)
-    layout.add("load_sec", "u4")
-    layout.add("load_nanosec", "u4")
-    layout.add_constant("resolution", "f4", recorded.resolution)
-    layout.add_constant("width", "u4", width)
-    layout.add_constant("height", "u4", height)
-    layout.add("position", "f8", 3)
-    layout.add("orientation", "f8", 4)
-    layout.add_constant("data_length", "u4", height * width)
-    layout.add("data", "i1", height * width)
-    rows = _stamped(layout, stamps)
-    _set_poses(rows, _pose_array(recorded.origin))
-    rows["data"] = np.array([0, 100, -1], dtype=np.int8)[recorded.cells].ravel()
-    return rows
-
-
-def _stamped(layout: LayoutBuilder, stamps: IntArray) -> NDArray[np.void]:
-    rows = layout.rows(len(stamps))
-    rows["sec"], rows["nanosec"] = np.divmod(stamps, 10**9)
-    return rows
-
-
-def _set_poses(rows: NDArray[np.void], poses: FloatArray) -> None:
-    """Fill in positions and orientations from poses (K, 3) [m, m, rad]."""
-    rows["position"][:, :2] = poses[:, :2]
-    rows["orientation"][:, 2] = np.sin(poses[:, 2] / 2.0)
-    rows["orientation"][:, 3] = np.cos(poses[:, 2] / 2.0)
-
-
-def _pose_array(pose: Pose2D) -> FloatArray:
-    return np.array([[pose.x, pose.y, pose.yaw]])

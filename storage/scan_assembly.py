@@ -1,17 +1,18 @@
 """A bag's laser scans as one stream of one geometry, and where on the body the laser sits."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
-from ses_core.arrays import FloatArray
+from ses_core.arrays import BoolArray, FloatArray
 from ses_core.extraction.recording import ScanStream
 from ses_core.extraction.stream_cleaning import clean_clock, first_of_each_stamp, returns_only
 from ses_core.extraction.transforms import PlanarMount, chain, planar_mount, transform_matrix
 from ses_core.geometry import Pose2D
 from ses_core.robot_profile import RobotProfile
-from storage.collected_streams import BASE_FRAMES, CollectedStreams
-from storage.message_decoding import FramedTransform, Scan
+from storage.collected_streams import BASE_FRAMES, CollectedStreams, by_time
+from storage.message_decoding import Scans, Transforms
 
 _STATIC_TOLERANCE = 1e-4
 """A transform on /tf that never moves more than this [m, or part of a quaternion] is a mount."""
@@ -28,42 +29,37 @@ def assemble_scans(
         base: Frame of the body.
     """
     warnings = streams.warnings
-    geometries = Counter(_geometry(scan) for _, scan in streams.scans if _is_scan(scan))
-    if not geometries:
-        warnings["dropped_empty_scan"] += len(streams.scans)
+    total = sum(len(block.stamps_ns) for block in streams.scans)
+    blocks = [_part(block, usable) for block in streams.scans if (usable := _is_scan(block)).any()]
+    warnings["dropped_empty_scan"] += total - sum(len(block.stamps_ns) for block in blocks)
+    if not blocks:
         warnings["no_scans"] = 1
         return None
-    empty = sum(not _is_scan(scan) for _, scan in streams.scans)
-    warnings["dropped_empty_scan"] += empty
-    geometry = geometries.most_common(1)[0][0]
-    alike = [
-        (stamp, scan)
-        for stamp, scan in streams.scans
-        if _is_scan(scan) and _geometry(scan) == geometry
-    ]
-    warnings["dropped_scan_geometry"] += len(streams.scans) - empty - len(alike)
-    stamps = np.array([stamp for stamp, _ in alike], dtype=np.int64)
-    order = np.arange(len(stamps))
+    chosen = _commonest_geometry(blocks)
+    alike = [_part(block, same) for block, same in zip(blocks, chosen, strict=True) if same.any()]
+    warnings["dropped_scan_geometry"] += sum(int(np.count_nonzero(~same)) for same in chosen)
+    stamps = np.concatenate([block.stamps_ns for block in alike])
+    order = np.argsort(stamps, kind="stable")
+    first = alike[0]
     if len(stamps) > 1:
-        clock = clean_clock(stamps, warnings)
+        clock = clean_clock(stamps[order], warnings)
         warnings["dropped_bad_stamp"] += clock.dropped
-        order = clock.order
+        order = order[clock.order]
     fresh = first_of_each_stamp(stamps[order])
     warnings["dropped_repeated_stamp"] += int(np.count_nonzero(~fresh))
     order = order[fresh]
-    first = alike[0][1]
-    range_max = first.range_max
+    angle_min, increment, range_min, range_max = first.geometry[0].astype(np.float64).tolist()
     if not (np.isfinite(range_max) and range_max > 0.0):
         range_max = profile.laser.range_max_m
-    range_min = first.range_min if np.isfinite(first.range_min) else profile.laser.range_min_m
-    ranges = np.empty((len(order), len(first.ranges)), dtype=np.float32)
-    for row, index in enumerate(order):
-        ranges[row] = alike[index][1].ranges
+    if not np.isfinite(range_min):
+        range_min = profile.laser.range_min_m
+    ranges = np.concatenate([block.ranges for block in alike])
+    if not np.array_equal(order, np.arange(len(ranges))):
+        ranges = ranges[order]
     mount = _mount(streams, profile, base, first.frame)
     sign = -1.0 if mount.is_upside_down else 1.0
-    angles: FloatArray = sign * (
-        first.angle_min + first.angle_increment * np.arange(len(first.ranges), dtype=np.float64)
-    )
+    beams = np.arange(ranges.shape[1], dtype=np.float64)
+    angles: FloatArray = sign * (angle_min + increment * beams)
     return ScanStream(
         stamps_ns=stamps[order],
         ranges=returns_only(ranges, range_min=range_min, range_max=range_max),
@@ -73,16 +69,33 @@ def assemble_scans(
     )
 
 
-def _is_scan(scan: Scan) -> bool:
-    return (
-        len(scan.ranges) > 1
-        and bool(np.isfinite((scan.angle_min, scan.angle_increment)).all())
-        and scan.angle_increment != 0.0
-    )
+def _is_scan(block: Scans) -> BoolArray:
+    """Tell which scans (K,) have more than one beam, in directions that make sense."""
+    angle_min, increment = block.geometry[:, 0], block.geometry[:, 1]
+    usable: BoolArray = np.isfinite(angle_min) & np.isfinite(increment) & (increment != 0.0)
+    return usable & (block.ranges.shape[1] > 1)
 
 
-def _geometry(scan: Scan) -> tuple[str, float, float, int]:
-    return scan.frame, round(scan.angle_min, 4), round(scan.angle_increment, 7), len(scan.ranges)
+def _part(block: Scans, chosen: BoolArray) -> Scans:
+    if chosen.all():
+        return block
+    return Scans(block.frame, block.stamps_ns[chosen], block.geometry[chosen], block.ranges[chosen])
+
+
+def _commonest_geometry(blocks: Sequence[Scans]) -> list[BoolArray]:
+    """Tell for every scan of every block whether it has the geometry that most have."""
+    rounded = [np.round(block.geometry[:, :2].astype(np.float64) * (1e4, 1e7)) for block in blocks]
+    counts: Counter[tuple[str, int, float, float]] = Counter()
+    for block, angles in zip(blocks, rounded, strict=True):
+        found, numbers = np.unique(angles, axis=0, return_counts=True)
+        for (angle_min, increment), number in zip(found.tolist(), numbers.tolist(), strict=True):
+            counts[block.frame, block.ranges.shape[1], angle_min, increment] += number
+    (frame, beams, *wanted), _ = counts.most_common(1)[0]
+    return [
+        (angles == np.array(wanted)).all(axis=1)
+        & (block.frame == frame and block.ranges.shape[1] == beams)
+        for block, angles in zip(blocks, rounded, strict=True)
+    ]
 
 
 def _mount(streams: CollectedStreams, profile: RobotProfile, base: str, laser: str) -> PlanarMount:
@@ -105,11 +118,16 @@ def _mount(streams: CollectedStreams, profile: RobotProfile, base: str, laser: s
     return PlanarMount(pose=pose, is_upside_down=False)
 
 
-def _constant(found: list[tuple[int, FramedTransform]], *, is_static: bool) -> FloatArray | None:
+def _constant(found: Sequence[Transforms], *, is_static: bool) -> FloatArray | None:
     """Give the matrix of transforms that never change; of static ones the last counts."""
+    _, (positions, turns) = by_time(
+        [block.stamps_ns for block in found],
+        [block.positions for block in found],
+        [block.orientations for block in found],
+    )
     if is_static:
-        return transform_matrix(found[-1][1].position, found[-1][1].orientation)
-    numbers = np.array([(*item.position, *item.orientation) for _, item in found])
+        return transform_matrix(positions[-1].tolist(), turns[-1].tolist())
+    numbers = np.column_stack((positions, turns))
     if not np.isfinite(numbers).all() or np.ptp(numbers, axis=0).max() > _STATIC_TOLERANCE:
         return None
-    return transform_matrix(found[0][1].position, found[0][1].orientation)
+    return transform_matrix(positions[0].tolist(), turns[0].tolist())

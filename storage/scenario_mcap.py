@@ -19,15 +19,10 @@ from ses_core.extraction.recording import CommandStream, PoseStream, RecordedMap
 from ses_core.extraction.trajectory import Trajectory
 from ses_core.geometry import Pose2D, inverse, to_frame, wrap_angle, wrap_angles
 from ses_core.place import Place, place_of_environment
+from storage.bag_messages import BagContent, MessageStream, map_stream, message_streams
 from storage.durable_files import disk_errors, make_folder, sync_file, sync_folder
 from storage.mcap_markers import MARKERS, PATH, marker_message, path_message
-from storage.rosbag_writer import (
-    BagContent,
-    MessageStream,
-    map_stream,
-    message_streams,
-    write_ros2,
-)
+from storage.rosbag_writer import write_ros2
 
 _FREE, _OCCUPIED, _UNKNOWN = 0, 1, 2
 

@@ -11,19 +11,21 @@ from pathlib import Path
 from ses_core.errors import LogError
 from ses_core.recipes import digest_json
 from storage.durable_files import disk_errors, temporary_name
-from storage.inbox import METADATA, Candidate
+from storage.inbox import METADATA, TABLE_FILES, Candidate
 from storage.log_formats import (
     CARMEN,
     ROSBAG1,
     ROSBAG2_MCAP,
     ROSBAG2_SQLITE,
     SUFFIXES,
+    TABLES,
     ZSTD_MAGIC,
     detect_format,
 )
 
 _BLOCK = 2**20
 _WRITE_BITS = 0o222
+_PARQUET_MAGIC, _ZIP_MAGIC = b"PAR1", b"PK\x03\x04"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +98,8 @@ def _claim(candidate: Candidate, folder: Path, staging: Path) -> ClaimedLog:
 
 def _role(file: Path) -> str:
     """Say what a file is within its upload; two uploads are the same log if these agree."""
-    if file.name == METADATA:
-        return METADATA
+    if file.name == METADATA or file.name in TABLE_FILES:
+        return file.name
     if file.name.endswith(("-wal", "-shm")):
         return file.name[-4:]
     return ".db3" if ".db3" in file.name else ".mcap" if ".mcap" in file.name else ".log"
@@ -105,8 +107,8 @@ def _role(file: Path) -> str:
 
 def _own_name(number: int, role: str, roles: dict[Path, str]) -> str:
     """Name a copy; a write-ahead log is named after its database, as SQLite expects."""
-    if role == METADATA:
-        return METADATA
+    if role == METADATA or role in TABLE_FILES:
+        return role
     if role != "-wal":
         return f"part-{number:04d}{role}"
     log = list(roles)[number]
@@ -149,6 +151,8 @@ def _refused(
 
 def _format(copies: list[Path]) -> str | None:
     """Tell the one format of all parts; compressed parts are given their suffix on the way."""
+    if any(copy.name in TABLE_FILES for copy in copies):
+        return TABLES if all(_is_table_file(copy) for copy in copies) else None
     found: set[str | None] = set()
     for copy in copies:
         if copy.name.endswith("-wal"):
@@ -167,6 +171,11 @@ def _format(copies: list[Path]) -> str | None:
     if len(found) != 1 or (is_folder and found & {ROSBAG1, CARMEN}):
         return None
     return found.pop()
+
+
+def _is_table_file(copy: Path) -> bool:
+    with copy.open("rb") as file:
+        return file.read(4) in (_PARQUET_MAGIC, _ZIP_MAGIC)
 
 
 def _settle(copy: Path, payload: Path) -> Path:

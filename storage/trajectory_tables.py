@@ -14,12 +14,8 @@ from ses_core.errors import SchemaError
 from ses_core.extraction.recording import RecordedMap, Recording, ScanStream
 from ses_core.extraction.trajectory import Trajectory
 from ses_core.geometry import Pose2D, compose_all
+from storage.log_formats import LOGS_FILE, MAP_FILE, SCANS_FILE, TRAJECTORIES_FILE
 from storage.parquet_files import read_table, write_empty_table, write_table
-
-LOGS_FILE = "logs.parquet"
-TRAJECTORIES_FILE = "trajectories.parquet"
-SCANS_FILE = "scans.parquet"
-MAP_FILE = "map.npz"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -59,7 +59,7 @@ def fleet_tasks(
     seed: int,
     preset: PairPreset = "default",
 ) -> list[NavigationTask]:
-    """Spread deployments evenly over worlds, world by world.
+    """Spread deployments evenly over worlds; those in one world follow each other.
 
     Raises:
         WorldError: No world has room for a start and a goal so far apart.
@@ -76,12 +76,18 @@ def fleet_tasks(
         for world in worlds
     ]
     rounds = max(map(len, pairs))
-    spread = [tasks[number] for number in range(rounds) for tasks in pairs if number < len(tasks)]
+    spread = [
+        (place, tasks[number])
+        for number in range(rounds)
+        for place, tasks in enumerate(pairs)
+        if number < len(tasks)
+    ]
     if not spread:
         raise WorldError(
             f"none of {len(worlds)} worlds has two places {min_distance:g} m apart, expected one"
         )
-    return spread[:count]
+    # A robot's drives are written together: what waits for its log stays in memory.
+    return [task for _, task in sorted(spread[:count], key=lambda placed: placed[0])]
 
 
 @task(name="deploy the fleet", cache_policy=NO_CACHE)
@@ -95,6 +101,7 @@ def deploy_fleet(
     out: Path,
     log_format: FleetFormat,
     seed: int,
+    day: date | None,
     store: LocalArtifactStore,
     settings: Settings,
 ) -> FleetDay:
@@ -113,7 +120,7 @@ def deploy_fleet(
         find_policy(policy, store.layout),
         out=out,
         log_format=log_format,
-        day=datetime.now(UTC).date(),
+        day=day or datetime.now(UTC).date(),
         seed=seed,
         settings=settings,
     )
@@ -134,6 +141,7 @@ def deploy_demonstration(
             "day": fleet.day.isoformat(),
             "policy": policy.policy_id,
             "simulation": settings_json(settings.simulation),
+            "fleet": settings_json(settings.fleet),
             "target_robot": settings_json(settings.target_robot),
         },
     )
@@ -184,8 +192,8 @@ def _drive(
         _counted(driven, total),
         tasks=tasks,
         format=log_format,
-        profile=settings.target_robot,
         day=day,
+        settings=settings,
     )
     total.seconds = round(time.perf_counter() - started, 3)
     return total

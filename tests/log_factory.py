@@ -12,8 +12,9 @@ from ses_core.extraction.recording import (
     ScanStream,
 )
 from ses_core.geometry import Pose2D
+from storage.bag_messages import BagContent
 from storage.log_formats import ROSBAG1, ROSBAG2_MCAP, ROSBAG2_SQLITE
-from storage.rosbag_writer import BagCompression, BagContent, BagFormat, write_rosbag
+from storage.rosbag_writer import BagCompression, BagFormat, write_rosbag
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD_NS = 50_000_000

@@ -7,7 +7,7 @@ import numpy as np
 
 from ses_core.learning.policies import FIXED_POLICIES
 from ses_core.robot_profile import JACKAL
-from ses_core.settings import SimulationSettings
+from ses_core.settings import Settings, SimulationSettings
 from ses_core.worlds.deployment import deploy
 from ses_core.worlds.homes import generate_homes
 from ses_core.worlds.pairs import sample_tasks
@@ -32,5 +32,7 @@ def write_fleet(inbox: Path, *, homes: int = 2, drives: int = 4, seed: int = 7) 
         simulation=SimulationSettings(sensing_rate_hz=2.0),
         profile=JACKAL,
     )
-    logs = write_deployments(inbox, driven, tasks=tasks, format="mcap", profile=JACKAL, day=DAY)
+    logs = write_deployments(
+        inbox, driven, tasks=tasks, format="mcap", day=DAY, settings=Settings()
+    )
     return len(logs)

@@ -84,22 +84,22 @@ def _trace(
     passed_by = np.full((size, size), -1, dtype=np.int64)
     beams = angles.shape[0]
     reach = np.empty(beams, dtype=np.float64)
+    ends = np.empty((beams, 2), dtype=np.float64)
     for scan in range(ranges.shape[0]):
         x, y, yaw = poses[scan]
         _fill_reach(ranges[scan], range_max, reach)
         for beam in range(beams):
+            length, direction = reach[beam] / resolution, yaw + angles[beam]
+            ends[beam, 0] = length * math.cos(direction)
+            ends[beam, 1] = length * math.sin(direction)
             if _is_return(ranges[scan, beam], range_max):
-                column = math.floor(x + reach[beam] / resolution * math.cos(yaw + angles[beam]))
-                row = math.floor(y + reach[beam] / resolution * math.sin(yaw + angles[beam]))
+                column, row = math.floor(x + ends[beam, 0]), math.floor(y + ends[beam, 1])
                 inside = 0 <= row < size and 0 <= column < size
                 if inside and hit_by[row, column] != scan:
                     hit_by[row, column] = scan
                     hits[row, column] += 1
         for beam in range(beams):
-            length = reach[beam] / resolution
-            dx = length * math.cos(yaw + angles[beam])
-            dy = length * math.sin(yaw + angles[beam])
-            _mark_passes(x, y, dx, dy, scan, hit_by, passed_by, passes)
+            _mark_passes(x, y, ends[beam, 0], ends[beam, 1], scan, hit_by, passed_by, passes)
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +24,7 @@ class PlanarMount:
     is_upside_down: bool
 
 
-def transform_matrix(
-    position: tuple[float, float, float], orientation: tuple[float, float, float, float]
-) -> FloatArray | None:
+def transform_matrix(position: Sequence[float], orientation: Sequence[float]) -> FloatArray | None:
     """Give the (4, 4) matrix of a position [m] and quaternion (x, y, z, w); None if unusable."""
     x, y, z, w = orientation
     norm = math.sqrt(x * x + y * y + z * z + w * w) if _all_finite(orientation) else 0.0
@@ -78,5 +76,5 @@ def planar_mount(matrix: FloatArray) -> PlanarMount:
     return PlanarMount(pose=pose, is_upside_down=bool(matrix[2, 2] < 0.0))
 
 
-def _all_finite(values: tuple[float, ...]) -> bool:
+def _all_finite(values: Sequence[float]) -> bool:
     return all(math.isfinite(value) for value in values)

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from ses_core.settings import IngestSettings, Settings
 from storage.artifact_store import LocalArtifactStore
+from storage.bag_messages import BagContent
 from storage.inbox import scan_inbox
 from storage.inbox_ledger import InboxLedger
 from storage.ingestion import take_in
 from storage.log_catalogue import catalogue
-from storage.rosbag_writer import BagContent
 from storage.table_log import TableLog
 from tasks.extract import extract_scenarios
 from tests.log_factory import drive, write_log

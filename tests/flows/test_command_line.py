@@ -54,6 +54,16 @@ def store(tmp_path: Path) -> Path:
         ("verify now", "'now'", "nothing more"),
         ("worlds", "no command", "import, show, generate"),
         ("worlds import /none --out x", "nothing at /none", "a file or folder"),
+        (
+            "deploy --worlds / --deployments 1 --out x --format bag --split-seconds 9",
+            "format bag",
+            "mcap or db3",
+        ),
+        (
+            "deploy --worlds / --deployments 1 --out x --odometry-drift 9",
+            "'9'",
+            "less than or equal to 0.2",
+        ),
         ("serve --cron hourly", "'hourly'", "five fields"),
         ("serve --timezone Berlin", "'Berlin'", "Europe/Berlin"),
         ("serve --host 0.0.0.0 --no-password", "0.0.0.0 without a password", "127.0.0.1"),

@@ -12,8 +12,8 @@ from ses_core.extraction.recording import Recording
 from ses_core.geometry import Pose2D
 from ses_core.robot_profile import GENERIC, RobotProfile
 from ses_core.settings import DecoderLimits
+from storage.bag_messages import BagContent
 from storage.rosbag_logs import RosbagLogReader
-from storage.rosbag_writer import BagContent
 from tests.log_factory import LOG_KINDS, MOUNT, START_NS, drive, without, write_log
 
 
