@@ -19,6 +19,9 @@ from ses_core.planning.potential import (
 )
 from ses_core.simulation.state import Memory, Scratch, Slot
 
+_SEARCH_EVERY = 2
+"""Ticks between searches: the Jackal's global costmap brings news at 10 Hz."""
+
 PLAN_CAPACITY = 1200
 PLAN_REACH_M = 5.3
 """The plan is followed until it leaves the local costmap (5 m) or is 1200 half cells long."""
@@ -45,7 +48,7 @@ def update_plan(
     else:
         is_found = True
     is_followed = is_found and _follow(slot, memory, number)
-    if is_found and not is_followed:
+    if is_found and not is_followed and slot.tick - slot.search_tick >= _SEARCH_EVERY:
         is_followed = spread_potential(slot, memory, number, scratch, worker) and _follow(
             slot, memory, number
         )

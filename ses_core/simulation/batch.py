@@ -259,7 +259,7 @@ class BatchSimulator:
             for first, into, size in zip(before, self._slots["map_offset"], kept, strict=True):
                 target[into : into + size] = source[first : first + size]
         largest = int(self._map_sizes.max())
-        if largest > self._scratch.is_pending.shape[1]:
+        if largest > self._scratch.bucket_of.shape[1]:
             threads = len(self._scratch.queue)
             self._scratch = _scratch(threads=threads, largest_map=largest)
 
@@ -300,7 +300,7 @@ def _scratch(*, threads: int, largest_map: int) -> Scratch:
         queue=np.zeros((threads, WINDOW_SIZE * WINDOW_SIZE), dtype=np.int32),
         columns=np.zeros((threads, _STALE_CELLS + 1, _STALE_CELLS + 2 * FAR_CELLS), dtype=np.int16),
         bucket_ends=np.full((threads, BUCKETS, 2), -1, dtype=np.int32),
-        following=np.zeros((threads, largest_map), dtype=np.int32),
-        is_pending=np.zeros((threads, largest_map), dtype=np.uint8),
+        links=np.zeros((threads, largest_map, 2), dtype=np.int32),
+        bucket_of=np.zeros((threads, largest_map), dtype=np.uint8),
         samples=np.zeros((threads, MAX_VX_SAMPLES * MAX_VTHETA_SAMPLES)),
     )
