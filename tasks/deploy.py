@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
+from itertools import cycle, islice
 from pathlib import Path
 
 import numpy as np
@@ -59,35 +60,34 @@ def fleet_tasks(
     seed: int,
     preset: PairPreset = "default",
 ) -> list[NavigationTask]:
-    """Spread deployments evenly over worlds; those in one world follow each other.
+    """Spread deployments evenly over the worlds that have pairs; those in one follow each other.
+
+    A world of one course is driven again and again, each time with other noise.
 
     Raises:
         WorldError: No world has room for a start and a goal so far apart.
     """
-    pairs = [
-        sample_tasks(
-            world,
-            -(-count // len(worlds)),
-            profile=profile,
-            min_distance=min_distance,
-            preset=preset,
-            rng=np.random.default_rng([seed, int(content_digest(world.grid)[:8], 16)]),
+
+    def pairs(world: World, number: int) -> list[NavigationTask]:
+        # More pairs of a world begin with the same ones.
+        rng = np.random.default_rng([seed, int(content_digest(world.grid)[:8], 16)])
+        return sample_tasks(
+            world, number, profile=profile, min_distance=min_distance, preset=preset, rng=rng
         )
-        for world in worlds
-    ]
-    rounds = max(map(len, pairs))
-    spread = [
-        (place, tasks[number])
-        for number in range(rounds)
-        for place, tasks in enumerate(pairs)
-        if number < len(tasks)
-    ]
-    if not spread:
+
+    usable = [world for world in worlds if pairs(world, 1)]
+    if not usable:
         raise WorldError(
             f"none of {len(worlds)} worlds has two places {min_distance:g} m apart, expected one"
         )
+    share, more = divmod(count, len(usable))
     # A robot's drives are written together: what waits for its log stays in memory.
-    return [task for _, task in sorted(spread[:count], key=lambda placed: placed[0])]
+    return [
+        task
+        for place, world in enumerate(usable)
+        if (number := share + (place < more))
+        for task in islice(cycle(pairs(world, number)), number)
+    ]
 
 
 @task(name="deploy the fleet", cache_policy=NO_CACHE)
