@@ -13,10 +13,10 @@ FILTER = Stage("filter", 1)
 FIT = Stage("fit", 1)
 SYNTHESIZE = Stage("synthesize", 1)
 RENDER = Stage("render", 1)
-TRAIN = Stage("train", 1)
-EVALUATE = Stage("evaluate", 2)
+TRAIN = Stage("train", 2)
+EVALUATE = Stage("evaluate", 3)
 REPORT = Stage("report", 2)
-PRETRAIN = Stage("pretrain", 1)
+PRETRAIN = Stage("pretrain", 2)
 DEPLOY = Stage("deploy", 2)
 
 STAGES = (

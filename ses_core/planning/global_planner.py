@@ -19,7 +19,7 @@ from ses_core.planning.potential import (
 )
 from ses_core.simulation.state import Memory, Scratch, Slot
 
-_SEARCH_EVERY = 2
+SEARCH_EVERY = 2
 """Ticks between searches: the Jackal's global costmap brings news at 10 Hz."""
 
 PLAN_CAPACITY = 1200
@@ -41,14 +41,17 @@ def update_plan(
     move_base plans anew at 20 Hz. The same plans come cheaper: what the laser finds can only make
     ways longer, so the potential holds as long as the way it leads along costs what it promised.
     It is computed anew when that fails, when the inflation radius changed, and after
-    `largest_age` ticks, because marks can also be cleared. Without any way the last plan stays.
+    `largest_age` ticks, because marks can also be cleared; but no sooner than after
+    `SEARCH_EVERY` ticks. Without any way the last plan stays.
     """
-    if slot.search_needed or slot.tick - slot.search_tick >= largest_age:
+    age = slot.tick - slot.search_tick
+    is_found = not slot.search_needed
+    may_search = age >= SEARCH_EVERY
+    if age >= largest_age or (slot.search_needed and may_search):
         is_found = spread_potential(slot, memory, number, scratch, worker)
-    else:
-        is_found = True
+        may_search = False
     is_followed = is_found and _follow(slot, memory, number)
-    if is_found and not is_followed and slot.tick - slot.search_tick >= _SEARCH_EVERY:
+    if is_found and not is_followed and may_search:
         is_followed = spread_potential(slot, memory, number, scratch, worker) and _follow(
             slot, memory, number
         )

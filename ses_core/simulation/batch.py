@@ -19,7 +19,7 @@ from ses_core.planning.costmap import (
     RESOLUTION_M,
     WINDOW_SIZE,
 )
-from ses_core.planning.global_planner import PLAN_CAPACITY
+from ses_core.planning.global_planner import PLAN_CAPACITY, SEARCH_EVERY
 from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.planning.potential import BUCKETS, UNREACHED
 from ses_core.planning.trajectory_planner import MAX_VTHETA_SAMPLES, MAX_VX_SAMPLES
@@ -224,7 +224,7 @@ class BatchSimulator:
         slot["goal_x"], slot["goal_y"] = task.goal
         slot["local_goal_x"], slot["local_goal_y"] = task.goal
         slot["random_state"] = sequence.generate_state(1, np.uint64)[0]
-        slot["search_needed"] = True
+        slot["search_needed"], slot["search_tick"] = True, -SEARCH_EVERY
         slot["inflation_radius"] = -1.0
         slot["outcome"] = EpisodeOutcome.RUNNING
         describe_world(slot, task.world.grid)

@@ -133,7 +133,7 @@ class Scratch(NamedTuple):
 
     queue: Int32Array  # (T, W * W) cells of a breadth-first search
     columns: Int16Array  # (T, H, W) squared distances along columns
-    bucket_ends: Int32Array  # (T, 32, 2) first and last cell of the global planner's buckets or -1
+    bucket_ends: Int32Array  # (T, 128, 2) first and last cell of a global planner's bucket or -1
     links: Int32Array  # (T, largest map, 2) cells before and after in the same bucket, or -1
     bucket_of: ByteArray  # (T, largest map) 1 + number of the bucket a cell is in, or 0
     samples: FloatArray  # (T, S) cost of the local planner's samples

@@ -13,7 +13,7 @@ from ses_core.compilation import compiled
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.planning.costmap import inflation_costs
 from ses_core.planning.distance_maps import measure_distances
-from ses_core.planning.global_planner import update_plan
+from ses_core.planning.global_planner import SEARCH_EVERY, update_plan
 from ses_core.planning.recovery import recover
 from ses_core.planning.rollouts import SIM_TIME_S
 from ses_core.planning.trajectory_planner import find_command
@@ -57,7 +57,7 @@ def plan(
     if has_news:
         slot.inflation_radius = parameters[_INFLATION_RADIUS]
         inflation_costs(memory.costs[number], slot.inflation_radius, robot.inscribed_radius)
-        slot.search_needed = True
+        slot.search_needed, slot.search_tick = True, slot.tick - SEARCH_EVERY
         update_plan(slot, memory, number, scratch, worker, setup.plan_age)
     farthest = max(parameters[_MAX_VEL_X], robot.min_vel_x) * (
         SIM_TIME_S + setup.sense_every * setup.period

@@ -47,5 +47,5 @@ def test_more_deployments_begin_with_the_same_pairs() -> None:
 
 
 def test_without_any_pair_the_fleet_stays_at_home() -> None:
-    with pytest.raises(WorldError, match="none of 1 worlds has two places 6.6 m apart"):
+    with pytest.raises(WorldError, match=r"none of 1 worlds has two places 6\.6 m apart"):
         spread([closet()], 3)
