@@ -4,8 +4,10 @@ Logs lie in `<out>/<site>/<robot>/`: a site is a world, its robots take turns, a
 drive or several of a robot's day. The nightly run cannot tell these logs from a robot's.
 """
 
+import shutil
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time, timedelta
 from pathlib import Path
@@ -20,7 +22,13 @@ from ses_core.settings import IngestSettings, Settings
 from ses_core.worlds.deployment import Deployment
 from storage.bag_messages import BagContent
 from storage.deployment_content import content_of
-from storage.durable_files import make_folder, write_if_absent
+from storage.durable_files import (
+    make_folder,
+    sync_file,
+    sync_folder,
+    temporary_name,
+    write_if_absent,
+)
 from storage.log_formats import TABLES
 from storage.rosbag_writer import write_rosbag
 from storage.trajectory_tables import LogDescription, write_ingested
@@ -166,7 +174,6 @@ def write_tables(
     profile = profile_of(identity, path.name, settings)
     recording = recording_of(content, profile=profile, pose_source=settings.pose_source)
     cuts = find_cuts(recording, profile=profile, settings=settings)
-    make_folder(path)
     description = LogDescription(
         log_id=digest_json(["deployment", identity.site, identity.robot, path.name]),
         name=path.name,
@@ -177,13 +184,31 @@ def write_tables(
         profile=profile.name,
         velocity_source=velocity_source(recording, settings),
     )
-    write_ingested(
-        path,
-        description,
-        recording,
-        resample(recording, profile=profile, settings=settings),
-        cut_counts={"dropouts": int(cuts.is_gap.sum()), "pose_jumps": int(cuts.is_jump.sum())},
-    )
+    with _whole_folder(path) as folder:
+        write_ingested(
+            folder,
+            description,
+            recording,
+            resample(recording, profile=profile, settings=settings),
+            cut_counts={"dropouts": int(cuts.is_gap.sum()), "pose_jumps": int(cuts.is_jump.sum())},
+        )
+
+
+@contextmanager
+def _whole_folder(path: Path) -> Iterator[Path]:
+    """Give a hidden folder to fill, which gets its name when it is whole: inboxes pass it over."""
+    make_folder(path.parent)
+    hidden = temporary_name(path)
+    hidden.mkdir()
+    try:
+        yield hidden
+        for file in hidden.iterdir():
+            sync_file(file)
+        sync_folder(hidden)
+        hidden.rename(path)
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)
+    sync_folder(path.parent)
 
 
 def _shifts(tasks: Sequence[NavigationTask], *, robot: str, robots_per_site: int) -> list[_Shift]:

@@ -27,10 +27,10 @@ LOG_SUFFIXES: Final = (".bag", ".db3", ".mcap", ".log", ".clf", ".log.gz", ".clf
 
 METADATA: Final = "metadata.yaml"
 PART_SUFFIXES: Final = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd", ".db3-wal", ".db3-shm")
-TABLE_MARKS: Final = frozenset((LOGS_FILE, TRAJECTORIES_FILE))
-"""A folder that holds both is a log that comes as tables."""
+TABLE_MARKS: Final = frozenset((LOGS_FILE, SCANS_FILE, TRAJECTORIES_FILE))
+"""A folder that holds all three is a log that comes as tables."""
 
-TABLE_FILES: Final = (*sorted(TABLE_MARKS), SCANS_FILE, MAP_FILE)
+TABLE_FILES: Final = (*sorted(TABLE_MARKS), MAP_FILE)
 _DONE, _CHECKSUM = ".done", ".sha256"
 _POLL_S = 2.0
 

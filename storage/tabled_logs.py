@@ -132,13 +132,9 @@ def _log_row(folder: Path, limit: int) -> _LogRow:
 
 
 def _scans(folder: Path, limit: int) -> tuple[ScanStream | None, FloatArray]:
-    path = folder / SCANS_FILE
-    nothing = None, np.empty((0, 3))
-    if not path.exists():
-        return nothing
-    rows = read_bounded(path, "scans", _SCAN_COLUMNS, byte_limit=limit)
+    rows = read_bounded(folder / SCANS_FILE, "scans", _SCAN_COLUMNS, byte_limit=limit)
     if not rows.num_rows:
-        return nothing
+        return None, np.empty((0, 3))
     stamps = _whole(rows, "stamp_ns")
     if np.any(np.diff(stamps) <= 0):
         raise LogError("bad_clock", "stamps of the scans do not ascend")

@@ -154,6 +154,17 @@ def test_damaged_files_are_refused(
     assert error.value.reason == reason
 
 
+def test_scans_may_be_empty_but_not_missing(tmp_path: Path, fleet: Path) -> None:
+    inbox = one_log(tmp_path, fleet)
+    scans = log_in(inbox) / SCANS_FILE
+    pq.write_table(pq.read_table(scans).slice(0, 0), scans)
+    assert all(drive.scans is None for drive in read(log_in(inbox)))
+    scans.unlink()
+    with pytest.raises(LogError, match=r"is damaged.*No such file"):
+        read(log_in(inbox))
+    assert Night(tmp_path / "store").take_in(inbox) == []
+
+
 def test_a_file_that_claims_more_rows_than_fit_is_not_read(tmp_path: Path, fleet: Path) -> None:
     log = log_in(fleet)
     limits = DecoderLimits(output_mib=1)

@@ -21,7 +21,10 @@ from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import GENERIC
 from ses_core.settings import DecoderLimits, IngestSettings, Settings
 from ses_core.worlds.deployment import Deployment
+from storage import trajectory_tables
 from storage.deployment_logs import FleetFormat, FleetLog, write_deployments
+from storage.inbox import InboxScan, scan_inbox
+from storage.inbox_ledger import InboxLedger
 from storage.rosbag_logs import RosbagLogReader
 from storage.trajectory_tables import read_log_row, read_trajectories
 
@@ -269,6 +272,35 @@ def test_deployments_that_break_off_leave_what_was_driven(tmp_path: Path) -> Non
         )
     (done,) = tmp_path.rglob("*.done")
     assert len(read_trajectories(done.with_suffix(""))) == 1
+
+
+def test_tables_that_were_never_finished_are_no_upload(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[InboxScan] = []
+
+    def killed(*_: object) -> None:
+        # The row of the log and its steps are on the disk.
+        assert len(list(tmp_path.rglob("*.parquet"))) == 2
+        found.append(_look_into(tmp_path))
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(trajectory_tables, "_write_scans", killed)
+        with pytest.raises(KeyboardInterrupt):
+            _write(tmp_path, "tables")
+    assert {(scan.new, scan.waiting) for scan in found} == {((), ())}
+    assert not list(tmp_path.rglob("*.parquet"))
+    assert len(_write(tmp_path, "tables")) == len(_look_into(tmp_path).new) == 3
+
+
+def _look_into(inbox: Path) -> InboxScan:
+    return scan_inbox(
+        inbox,
+        ledger=InboxLedger(inbox / "ledger"),
+        settings=IngestSettings(steady_s=0.0),
+        progress=lambda line: None,
+    )
 
 
 def test_a_log_is_never_written_over(tmp_path: Path) -> None:
