@@ -1,8 +1,16 @@
 """`FleetSettings`: how a simulated fleet's day is laid out, and what its robots record."""
 
+from typing import Final
+
 from pydantic import Field
 
 from ses_core.settings_model import SettingsModel
+
+START_WINDOW_S: Final = 2.0
+"""Drives begin up to this much later than planned."""
+
+_SHORTEST_PAUSE_S: Final = START_WINDOW_S + 8.0
+"""What is left of a pause must stay longer than the gap that cuts a log into drives."""
 
 
 class FleetSettings(SettingsModel):
@@ -18,7 +26,10 @@ class FleetSettings(SettingsModel):
         None, gt=0, description="MCAP and db3: go on in a new file after so long, within a log."
     )
     pause_s: float = Field(
-        50.0, gt=0, description="From the longest drive's end to the robot's next start."
+        50.0,
+        ge=_SHORTEST_PAUSE_S,
+        description="From the longest drive's end to the robot's next planned start, at least 10: "
+        "starts vary by 2 s, and 5 s without a pose tell two drives of a log apart.",
     )
     publishes_map: bool = Field(
         False, description="Record the world as a map, and where the odometry lies in it."

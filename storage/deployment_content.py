@@ -7,6 +7,7 @@ import numpy as np
 
 from ses_core.arrays import FloatArray, IntArray
 from ses_core.extraction.recording import CommandStream, PoseStream, RecordedMap, ScanStream
+from ses_core.fleet_settings import START_WINDOW_S
 from ses_core.geometry import Pose2D, compose_rows, inverse_rows
 from ses_core.robot_profile import RobotProfile
 from ses_core.worlds.deployment import Deployment
@@ -18,9 +19,6 @@ _BEFORE_START_NS = 300_000_000
 
 _GOAL_NS = 40_000_000
 """A goal is set this long before the robot starts for it."""
-
-_START_WINDOW_NS = 2_000_000_000
-"""Drives begin up to this much later than planned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +93,7 @@ def content_of(
 
 def _drive(deployment: Deployment, start_ns: int, origin: Pose2D, *, in_map: bool) -> _Drive:
     rng = np.random.default_rng([deployment.seed, deployment.number])
-    begun = start_ns + int(rng.integers(_START_WINDOW_NS))
+    begun = start_ns + int(rng.integers(round(START_WINDOW_S * 1e9)))
     times = begun + np.rint(deployment.times * 1e9).astype(np.int64)
     odometry = record_stamps(times, ODOMETRY, rng=rng)
     transforms = record_stamps(odometry.header_ns, TRANSFORM, rng=rng)

@@ -1,12 +1,15 @@
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, date, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from pydantic import ValidationError
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -19,7 +22,7 @@ from ses_core.geometry import Pose2D
 from ses_core.navigation import NavigationTask, World
 from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import GENERIC
-from ses_core.settings import DecoderLimits, IngestSettings, Settings
+from ses_core.settings import DecoderLimits, IngestSettings, Settings, SimulationSettings
 from ses_core.worlds.deployment import Deployment
 from storage import trajectory_tables
 from storage.deployment_logs import FleetFormat, FleetLog, write_deployments
@@ -241,6 +244,27 @@ def test_odometry_goes_on_where_it_was_when_the_robot_is_carried_to_its_next_sta
     way = np.hypot(*(poses.poses[-1, :2] - poses.poses[pause + 1, :2]))
     assert way == pytest.approx(float(np.hypot(*second[-1, :2])))
     assert np.allclose(poses.poses[pause], first[-1])
+
+
+def test_drives_of_a_log_stay_apart_after_the_shortest_pause(tmp_path: Path) -> None:
+    with pytest.raises(ValidationError, match="pause_s"):
+        FleetSettings(pause_s=9.9)
+    # Every drive lasts as long as one may, and fractions of seconds are rounded in between.
+    settings = Settings(
+        simulation=SimulationSettings(time_limit_s=3.0),
+        fleet=FleetSettings(robots_per_site=1, drives_per_log=40, pause_s=10.5),
+    )
+    drives = [replace(_deployment(0), number=number, seed=number) for number in range(40)]
+    (log,) = write_deployments(
+        tmp_path, drives, tasks=TASKS[:1] * 40, format="tables", day=DAY, settings=settings
+    )
+    trajectories = read_trajectories(log.path)
+    assert len(trajectories) == 40
+    pauses = [
+        int(after.stamps_ns[0] - before.stamps_ns[-1]) * 1e-9
+        for before, after in pairwise(trajectories)
+    ]
+    assert IngestSettings().gap_s < min(pauses) < 10.0 < max(pauses)
 
 
 @pytest.mark.parametrize("kind", ["mcap", "bag"])
