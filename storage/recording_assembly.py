@@ -207,7 +207,7 @@ def _commands(streams: CollectedStreams, profile: RobotProfile) -> CommandStream
         [block.stamps_ns for block in streams.commands],
         [block.twists for block in streams.commands],
     )
-    if len(stamps) > 1:
+    if len(stamps):
         clock = clean_clock(stamps, warnings)
         warnings["dropped_bad_stamp"] += clock.dropped
         stamps, commands = stamps[clock.order], commands[clock.order]

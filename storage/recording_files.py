@@ -16,12 +16,14 @@ from ses_core.extraction.recording import (
     Recording,
     ScanStream,
 )
+from ses_core.extraction.stream_cleaning import YEAR_2100_NS
 from ses_core.extraction.tabled_drives import TabledLog
 from ses_core.geometry import Pose2D
 
 _HEADER = "recording.json"
 _HEADER_LIMIT = 2**20
 _WARNING_LIMIT = 100
+_STEP_LIMIT = 2**53
 _SCALARS = {"int64": np.int64, "float64": np.float64, "float32": np.float32, "uint8": np.uint8}
 
 
@@ -160,8 +162,9 @@ class _Files:
         total = len(recording.poses.stamps_ns)
         _require(len(first_steps) == len(lengths) > 0, "uneven drives")
         _require(bool(np.all(lengths > 0)) and int(lengths.sum()) == total, "uneven drives")
-        follows = first_steps[1:] > first_steps[:-1] + lengths[:-1] - 1
-        _require(first_steps[0] >= 0 and bool(np.all(follows)), "drives overlap")
+        _require(first_steps[0] >= 0 and first_steps[-1] < _STEP_LIMIT, "bad step numbers")
+        ascends = bool(np.all(first_steps[1:] > first_steps[:-1]))
+        _require(ascends and bool(np.all(np.diff(first_steps) >= lengths[:-1])), "drives overlap")
         _require(len(scan_poses) == scans, "uneven scan poses")
         _require(bool(np.isfinite(scan_poses).all()), "scan poses are not finite")
         return TabledLog(
@@ -209,7 +212,10 @@ class _Files:
 
     def _stamps(self, name: str) -> NDArray[Any]:
         stamps = self._array(name, "int64", (None,))
-        _require(bool(np.all(np.diff(stamps) >= 0)), f"{name} go backwards")
+        # Compared, not subtracted: a difference of whole numbers wraps around.
+        _require(bool(np.all(stamps[1:] >= stamps[:-1])), f"{name} go backwards")
+        in_range = not len(stamps) or (stamps[0] >= 0 and stamps[-1] < YEAR_2100_NS)
+        _require(bool(in_range), f"{name} are not between 1970 and 2100")
         return stamps
 
     def _array(self, name: str, dtype: str, shape: tuple[int | None, ...]) -> NDArray[Any]:

@@ -41,7 +41,7 @@ def assemble_scans(
     stamps = np.concatenate([block.stamps_ns for block in alike])
     order = np.argsort(stamps, kind="stable")
     first = alike[0]
-    if len(stamps) > 1:
+    if len(stamps):
         clock = clean_clock(stamps[order], warnings)
         warnings["dropped_bad_stamp"] += clock.dropped
         order = order[clock.order]

@@ -59,10 +59,9 @@ def read_tabled_log(folder: Path, *, limits: DecoderLimits) -> TabledLog:
     numbers, stamps = _whole(steps, "step"), _whole(steps, "stamp_ns")
     if not len(numbers):
         raise LogError("empty", "trajectories.parquet holds no step")
-    if numbers[0] < 0 or np.any(np.diff(numbers) <= 0):
-        raise LogError("schema_conflict", "step numbers do not ascend")
-    if stamps[0] < 0 or stamps[-1] >= YEAR_2100_NS or np.any(np.diff(stamps) <= 0):
-        raise LogError("bad_clock", "stamps of the steps do not ascend between 1970 and 2100")
+    if numbers[0] < 0 or numbers[-1] >= _COUNT_LIMIT or not _ascend(numbers):
+        raise LogError("schema_conflict", "step numbers do not ascend from 0 on")
+    _require_clock(stamps, "steps")
     poses = _real(steps, "x_m", "y_m", "yaw_rad")
     _require_poses(poses, "steps")
     scans, scan_poses = _scans(folder, limit)
@@ -136,8 +135,7 @@ def _scans(folder: Path, limit: int) -> tuple[ScanStream | None, FloatArray]:
     if not rows.num_rows:
         return None, np.empty((0, 3))
     stamps = _whole(rows, "stamp_ns")
-    if np.any(np.diff(stamps) <= 0):
-        raise LogError("bad_clock", "stamps of the scans do not ascend")
+    _require_clock(stamps, "scans")
     geometry = _real(rows, *_GEOMETRY)
     if not np.isfinite(geometry).all() or np.any(geometry != geometry[0]):
         raise LogError("schema_conflict", "scans are not all of one laser in one place")
@@ -189,6 +187,16 @@ def _map(folder: Path, limit: int) -> RecordedMap | None:
     except (zipfile.BadZipFile, OSError, ValueError, KeyError, TypeError, EOFError) as error:
         raise LogError("schema_conflict", f"map.npz is no map: {error}") from error
     return RecordedMap(cells=cells, resolution=resolution, origin=Pose2D(x, y, yaw))
+
+
+def _require_clock(stamps: IntArray, what: str) -> None:
+    if stamps[0] < 0 or stamps[-1] >= YEAR_2100_NS or not _ascend(stamps):
+        raise LogError("bad_clock", f"stamps of the {what} do not ascend between 1970 and 2100")
+
+
+def _ascend(numbers: IntArray) -> bool:
+    # Compared, not subtracted: a difference of whole numbers wraps around.
+    return bool(np.all(numbers[1:] > numbers[:-1]))
 
 
 def _require_poses(poses: FloatArray, what: str) -> None:

@@ -61,6 +61,12 @@ def shifted(columns: dict[str, Any]) -> None:
     columns["stamp_ns"][10:] += 1
 
 
+def wrapped(columns: dict[str, Any]) -> None:
+    """Stamps whose differences wrap around to positive numbers."""
+    columns["stamp_ns"] = columns["stamp_ns"].copy()
+    columns["stamp_ns"][:5] = [0, 8 * 10**18, -9 * 10**18, -8 * 10**18, -(10**18)]
+
+
 def doubled(columns: dict[str, Any]) -> None:
     for name, values in columns.items():
         columns[name] = np.concatenate((values, values))
@@ -77,6 +83,11 @@ BROKEN: dict[str, tuple[str, Change, str, str]] = {
     "a jump": (TRAJECTORIES_FILE, cell("x_m", 7, 900.0), "bad_values", "m long"),
     "another clock": (TRAJECTORIES_FILE, shifted, "bad_clock", "0.05 s apart"),
     "time running back": (TRAJECTORIES_FILE, cell("stamp_ns", 7, 5), "bad_clock", "ascend"),
+    "stamps that wrap around": (TRAJECTORIES_FILE, wrapped, "bad_clock", "ascend"),
+    "stamps of scans that wrap around": (SCANS_FILE, wrapped, "bad_clock", "of the scans"),
+    "a scan before 1970": (SCANS_FILE, cell("stamp_ns", 0, -1), "bad_clock", "of the scans"),
+    "a scan after 2100": (SCANS_FILE, cell("stamp_ns", -1, 5 * 10**18), "bad_clock", "scans"),
+    "a step beyond counting": (TRAJECTORIES_FILE, cell("step", -1, 2**62), "schema_conflict", "0"),
     "a step twice": (TRAJECTORIES_FILE, cell("step", 7, 6), "schema_conflict", "ascend"),
     "a step before the first": (TRAJECTORIES_FILE, cell("step", 0, -1), "schema_conflict", "asc"),
     "a scan pose that is no number": (

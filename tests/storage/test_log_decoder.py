@@ -3,19 +3,27 @@
 import os
 import resource
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ses_core.errors import LogError
-from ses_core.extraction.recording import Recording
+from ses_core.extraction.recording import PoseStream, Recording, ScanStream
+from ses_core.extraction.tabled_drives import TabledLog
+from ses_core.geometry import Pose2D
 from ses_core.robot_profile import GENERIC
 from ses_core.settings import DecoderLimits
 from storage.log_decoder import decode_log
 from storage.log_formats import CARMEN, make_reader
 from storage.quarantine import REASONS
-from storage.recording_files import read_recording, write_recording
+from storage.recording_files import (
+    read_recording,
+    read_tabled_log_back,
+    write_recording,
+    write_tabled_log,
+)
 from tests.log_factory import drive, write_carmen, write_log
 from tests.storage.hostile_logs import HOSTILE, bz2_bomb
 
@@ -131,3 +139,56 @@ def test_what_the_child_hands_over_is_checked(tmp_path: Path) -> None:
         (tmp_path / "log" / f"{name}.npy").write_bytes(whole)
     with pytest.raises(LogError):
         read_recording(tmp_path / "log", byte_limit=10)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        ([0, 8 * 10**18, -9 * 10**18, -8 * 10**18], "go backwards"),
+        ([-1, 0, 1, 2], "not between 1970 and 2100"),
+        ([0, 1, 2, 5 * 10**18], "not between 1970 and 2100"),
+    ],
+)
+@pytest.mark.parametrize("stream", ["poses", "scans"])
+def test_stamps_that_no_clock_gives_are_refused(
+    tmp_path: Path, stream: str, stamps: list[int], said: str
+) -> None:
+    scans = ScanStream(
+        stamps_ns=np.arange(4),
+        ranges=np.ones((4, 2), dtype=np.float32),
+        angles=np.zeros(2),
+        range_max=9.0,
+        mount=Pose2D(0.0, 0.0),
+    )
+    recording = replace(_recording(), scans=scans)
+    changed = replace(getattr(recording, stream), stamps_ns=np.array(stamps))
+    write_recording(tmp_path, replace(recording, **{stream: changed}))
+    with pytest.raises(LogError, match=said) as error:
+        read_recording(tmp_path, byte_limit=MEBIBYTE)
+    assert error.value.reason == "decoder_bug"
+
+
+@pytest.mark.parametrize("first_steps", [[2**63 - 1, 0], [5, 0], [0, 1], [0, 2**62]])
+def test_drives_whose_steps_overlap_are_refused(tmp_path: Path, first_steps: list[int]) -> None:
+    log = TabledLog(
+        recording=_recording(),
+        first_steps=np.array(first_steps),
+        lengths=np.array([2, 2]),
+        scan_poses=np.empty((0, 3)),
+    )
+    write_tabled_log(tmp_path, log)
+    with pytest.raises(LogError, match=r"overlap|step numbers"):
+        read_tabled_log_back(tmp_path, byte_limit=MEBIBYTE)
+
+
+def _recording() -> Recording:
+    return Recording(
+        poses=PoseStream(stamps_ns=np.arange(4), poses=np.zeros((4, 3)), twists=np.zeros((4, 2))),
+        commands=None,
+        scans=None,
+        map=None,
+        pose_source="odometry",
+        has_clock=True,
+        messages_in=8,
+        messages_used=8,
+    )
