@@ -126,31 +126,40 @@ def deploy_fleet(
     )
 
 
-@task(name="deploy the demonstration fleet", cache_policy=NO_CACHE)
-def deploy_demonstration(
-    fleet: DemonstrationFleet, *, store: LocalArtifactStore, settings: Settings
-) -> Materialized:
-    """Let a small fleet drive through generated homes; its logs are kept as an artifact."""
-    policy = find_policy("original", store.layout)
-    recipe = Recipe(
+def demonstration_recipe(fleet: DemonstrationFleet, policy_id: str, settings: Settings) -> Recipe:
+    """Name all that decides what the demonstration's logs hold."""
+    return Recipe(
         DEPLOY,
         {
             "homes": fleet.homes,
             "deployments": fleet.deployments,
             "seed": fleet.seed,
             "day": fleet.day.isoformat(),
-            "policy": policy.policy_id,
+            "policy": policy_id,
+            "simulator": settings.evaluation.simulator,
+            "min_distance_m": settings.evaluation.min_distance_m,
+            "pair_preset": settings.evaluation.pair_preset,
             "simulation": settings_json(settings.simulation),
             "fleet": settings_json(settings.fleet),
             "target_robot": settings_json(settings.target_robot),
         },
     )
 
+
+@task(name="deploy the demonstration fleet", cache_policy=NO_CACHE)
+def deploy_demonstration(
+    fleet: DemonstrationFleet, *, store: LocalArtifactStore, settings: Settings
+) -> Materialized:
+    """Let a small fleet drive through generated homes; its logs are kept as an artifact."""
+    policy = find_policy("original", store.layout)
+    recipe = demonstration_recipe(fleet, policy.policy_id, settings)
+
     def build(directory: Path) -> None:
         tasks = fleet_tasks(
             generate_homes(fleet.homes, seed=fleet.seed),
             fleet.deployments,
             min_distance=settings.evaluation.min_distance_m,
+            preset=settings.evaluation.pair_preset,
             profile=settings.target_robot,
             seed=fleet.seed,
         )
