@@ -27,11 +27,10 @@ from ses_core.worlds.cellular_automata import (
     FIELD_START_M,
     barn_course,
 )
-from ses_core.worlds.identity import named_world
+from ses_core.worlds.identity import Course, named_world
 from storage.world_files import first_line
 
 BarnCourse = Literal["protocol", "path"]
-Course = tuple[Pose2D, tuple[float, float]]
 
 _RUN_UP_M = 1.0
 

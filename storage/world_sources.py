@@ -3,7 +3,7 @@
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +12,7 @@ import numpy as np
 from ses_core.arrays import IntArray
 from ses_core.errors import NotAMapError, WorldError
 from ses_core.navigation import World
+from ses_core.worlds.identity import named_world
 from ses_core.worlds.mesh_slicing import DEFAULT_SLICING, MeshSlicing
 from storage.array_worlds import ARRAY_SUFFIX, read_array_world
 from storage.barn_files import BarnCourse, barn_field, path_course, read_barn_array
@@ -201,7 +202,8 @@ def _with_courses(
             raise WorldError(
                 f"{world.name} has no path, expected path_{max(number, 0)}.npy beside it"
             )
-        yield replace(world, course=path_course(known[number]))
+        course = path_course(known[number])
+        yield named_world(world.name, world.grid, source=world.source, course=course)
 
 
 def _number(name: str) -> int:

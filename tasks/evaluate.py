@@ -15,7 +15,7 @@ from ses_core.navigation import NavigationTask, environment_task
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, digest_json, settings_json
 from ses_core.settings import Settings
 from ses_core.simulation.factory import SimulatorName
-from ses_core.worlds.identity import content_digest
+from ses_core.worlds.identity import content_digest, world_digest
 from storage.artifact_store import LocalArtifactStore
 from storage.environment_files import read_environments
 from storage.evaluation_files import write_evaluation
@@ -54,7 +54,9 @@ def heldout_digest(source: HeldoutWorlds) -> str:
     if not source.paths:
         return ""
     worlds = read_worlds(source.paths, part=source.part, resolution=source.resolution)
-    return digest_json([[world.world_id, content_digest(world.grid)] for world in worlds])
+    return digest_json(
+        [[world.world_id, world_digest(world.grid, world.course)] for world in worlds]
+    )
 
 
 def refuse_known_worlds(

@@ -20,7 +20,7 @@ from ses_core.worlds.cellular_automata import (
     generate_barn_world,
 )
 from storage import world_archives
-from storage.world_sets import find_worlds, read_worlds
+from storage.world_sets import find_worlds, read_worlds, write_world_set
 from storage.world_sources import Reading
 from tests.shared_data import shared_data
 
@@ -121,7 +121,11 @@ def test_a_path_gives_start_and_goal_where_that_is_asked_for(tmp_path: Path) -> 
         (-4.5 + 0.15 * (PATH[0, 0] + 0.5), -4.5 + 0.15 * (PATH[-1, 0] + 0.5))
     )
     assert (start.y, goal[1]) == pytest.approx((5.1 + 0.075 - 1.0, COURSE_GOAL[1]))
-    assert find_worlds([tmp_path]).worlds[0].course == (COURSE_START, COURSE_GOAL)
+    (by_protocol,) = find_worlds([tmp_path]).worlds
+    assert by_protocol.course == (COURSE_START, COURSE_GOAL)
+    # Sets of both keep both.
+    write_world_set(tmp_path / "both", [world, by_protocol])
+    assert len(read_worlds([tmp_path / "both"])) == 2
     (tmp_path / "path_files" / "path_7.npy").unlink()
     with pytest.raises(WorldError, match=r"grid_7 has no path, expected path_7\.npy"):
         find_worlds([tmp_path], reading=by_path)
