@@ -1,11 +1,22 @@
 """`ses worlds generate`, and `ses deploy`: a simulated fleet's day in them."""
 
-from datetime import datetime
 from typing import Annotated, Literal
 
 import typer
 
 from flows.command_context import answer_facts, command_context, given
+from flows.fleet_options import (
+    DateOption,
+    DeploymentsOption,
+    DriverOption,
+    DrivesPerLogOption,
+    LogFormatOption,
+    MinDistanceOption,
+    OdometryDriftOption,
+    PublishMapOption,
+    RobotsOption,
+    SplitSecondsOption,
+)
 from flows.policy_names import check_policies
 from flows.shared_options import (
     OutOption,
@@ -20,11 +31,6 @@ from flows.world_set_commands import answer_worlds, worlds_app
 
 app = typer.Typer()
 app.add_typer(worlds_app)
-
-DateOption = Annotated[
-    datetime | None,
-    typer.Option(formats=["%Y-%m-%d"], metavar="YYYY-MM-DD", help="Day it drove; else today."),
-]
 
 
 @worlds_app.command(epilog="Example: ses worlds generate homes --count 8 --seed 3 --out homes")
@@ -56,40 +62,19 @@ def generate(
 def deploy(
     context: typer.Context,
     worlds: WorldsOption,
-    deployments: Annotated[int, typer.Option(metavar="N", min=1, help="Drives to record.")],
+    deployments: DeploymentsOption,
     out: OutOption,
-    policy: Annotated[str, typer.Option(metavar="NAME", help="Who drives.")] = "dwa-slow",
-    log_format: Annotated[
-        Literal["mcap", "db3", "bag", "tables"], typer.Option("--format", help="Of the logs.")
-    ] = "mcap",
+    policy: DriverOption = "dwa-slow",
+    log_format: LogFormatOption = "mcap",
     part: PartOption = None,
     resolution: ResolutionOption = None,
-    min_distance: Annotated[
-        float | None, typer.Option(metavar="D", help="Least start-goal distance [m].")
-    ] = None,
+    min_distance: MinDistanceOption = None,
     pair_preset: PairPresetOption = None,
-    robots: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Robots that take turns in a world.")
-    ] = None,
-    drives_per_log: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Drives in one log; 1, in tables 50.")
-    ] = None,
-    split_seconds: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="MCAP and db3: a new file of the log after so long."),
-    ] = None,
-    publish_map: Annotated[
-        bool, typer.Option("--publish-map", help="Record the world as a map, too.")
-    ] = False,
-    odometry_drift: Annotated[
-        float | None,
-        typer.Option(
-            metavar="D",
-            min=0.0,
-            max=0.2,
-            help="Share by which ways and turns are off; 0.01 is real.",
-        ),
-    ] = None,
+    robots: RobotsOption = None,
+    drives_per_log: DrivesPerLogOption = None,
+    split_seconds: SplitSecondsOption = None,
+    publish_map: PublishMapOption = False,
+    odometry_drift: OdometryDriftOption = None,
     date: DateOption = None,
     simulator: SimulatorOption = None,
     seed: SeedOption = None,
