@@ -1,7 +1,6 @@
 """Gazebo `.world` files, BARN's among them: their solids as seen from above."""
 
 import math
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -25,6 +24,7 @@ from ses_core.worlds.grids import MOST_CELLS
 from ses_core.worlds.identity import named_world
 from ses_core.worlds.mesh_slicing import DEFAULT_SLICING, MeshSlicing
 from storage.gazebo_marks import declared_course, declared_floor, is_marked, sdf_numbers
+from storage.sdf_tree import sdf_tree
 from storage.world_files import read_text
 
 GAZEBO_SUFFIXES = frozenset({".world", ".sdf"})
@@ -35,8 +35,8 @@ RESOLUTION_M = 0.05
 _UPRIGHT_RAD = 0.05
 """Worlds saved from a running simulation lean by less."""
 
-_NEEDLESS = re.compile(r"<(state|visual|inertial)(?:\s[^>]*)?(?<!/)>.*?</\1\s*>", re.DOTALL)
-"""Gazebo repeats every model in the state it saved: most of a file is nothing for us to parse."""
+_NEEDLESS = frozenset({"state", "inertial"})
+"""What of a world nobody bumps into, and most of a saved one."""
 
 _SCENERY = frozenset({"ground_plane", "sun"})
 """Models included everywhere that nobody bumps into."""
@@ -95,13 +95,8 @@ def read_gazebo_world(
         WorldError: It is no SDF, or needs other files or shapes, or has no obstacle.
     """
     text = read_text(path) if text is None else text
-    if "<!DOCTYPE" in text:
-        raise WorldError(f"{path} declares a document type, expected plain SDF without entities")
-    try:
-        needed = text if is_marked(text) else _NEEDLESS.sub("", text)
-        world = ET.fromstring(needed).find("world")
-    except ET.ParseError as error:
-        raise WorldError(f"{path} is no XML: {error}") from error
+    needless = _NEEDLESS if is_marked(text) else _NEEDLESS | {"visual"}
+    world = sdf_tree(text, path, without=needless).find("world")
     if world is None:
         raise NotAMapError(f"{path} has no <world>, expected SDF")
     _refuse_includes(world, path)

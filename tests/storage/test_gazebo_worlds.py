@@ -1,4 +1,5 @@
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -158,3 +159,27 @@ def test_an_original_barn_world_has_its_cylinders_and_course() -> None:
     assert world.grid.cells.shape == (94, 30)
     assert np.count_nonzero(world.grid.cells) == 209
     assert world.course == (COURSE_START, COURSE_GOAL)
+
+
+def test_comments_and_empty_elements_hide_no_obstacle(tmp_path: Path) -> None:
+    posts = (_box(0, 0, 0, "1 1 1"), _box(3, 0, 0, "1 1 1"), _box(6, 0, 0, "1 1 1"))
+    alone = read_gazebo_world(_write(tmp_path, *posts))
+    commented = ("<!-- a <state> of mind -->", posts[0], "<state/>", posts[1])
+    read = read_gazebo_world(_write(tmp_path, *commented, "<!-- </state><visual> -->", posts[2]))
+    assert np.array_equal(alone.grid.cells, read.grid.cells)
+    nested = f"<state><model><state>{posts[2]}</state>{posts[2]}</model>{posts[2]}</state>"
+    read = read_gazebo_world(_write(tmp_path, *posts[:2], nested))
+    assert read.grid.width_m == pytest.approx(4.0)
+
+
+def test_a_file_crafted_to_be_slow_is_read_in_a_moment(tmp_path: Path) -> None:
+    path = _write(tmp_path, _box(0, 0, 0, "1 1 1") + "<!-- " + "<state>" * 300_000 + " -->")
+    started = time.process_time()
+    read_gazebo_world(path)
+    assert time.process_time() - started < 5.0
+
+
+def test_models_nested_too_deep_are_refused_in_one_line(tmp_path: Path) -> None:
+    deep = "<model>" * 100_000 + "</model>" * 100_000
+    with pytest.raises(WorldError, match="nests elements more than 64 deep"):
+        read_gazebo_world(_write(tmp_path, deep))
