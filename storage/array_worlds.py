@@ -5,13 +5,14 @@
 """
 
 import io
+import lzma
 import zipfile
 import zlib
 from pathlib import Path
 
 import numpy as np
 
-from ses_core.errors import WorldError
+from ses_core.errors import NotAMapError, WorldError
 from ses_core.geometry import Pose2D
 from ses_core.navigation import World
 from ses_core.occupancy import OccupancyGrid
@@ -23,6 +24,20 @@ from storage.world_files import first_line
 ARRAY_SUFFIX = ".npz"
 
 _SHAPES = {"resolution": (), "origin": (2,), "start": (3,), "goal": (2,)}
+
+_UNREADABLE = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    # Of an encrypted entry, and its subclass NotImplementedError of an unknown compression.
+    RuntimeError,
+    # Of a header that claims more than there is.
+    MemoryError,
+)
 
 
 def array_world(place: Place) -> bytes:
@@ -46,6 +61,7 @@ def read_array_world(path: Path) -> World:
     """Read the world that `array_world` wrote; what was not observed counts as the cells say.
 
     Raises:
+        NotAMapError: It holds other arrays.
         WorldError: It is no such file, or larger than any world.
     """
     try:
@@ -54,9 +70,14 @@ def read_array_world(path: Path) -> World:
             if sum(entry.file_size for entry in archive.infolist()) > 2 * MOST_CELLS + 2**20:
                 raise WorldError(f"{path} unpacks to more than {MOST_CELLS} cells")
         with np.load(path, allow_pickle=False) as arrays:
+            if missing := {"cells", *_SHAPES} - set(arrays.files):
+                raise NotAMapError(
+                    f"{path} has no {', '.join(sorted(missing))}, expected the arrays of a world "
+                    "that `ses export` wrote"
+                )
             cells = arrays["cells"]
             numbers = {name: np.asarray(arrays[name], dtype=np.float64) for name in _SHAPES}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except _UNREADABLE as error:
         raise WorldError(f"{path} cannot be read as a world: {first_line(error)}") from error
     if cells.ndim != 2 or cells.dtype != np.bool_ or not 0 < cells.size <= MOST_CELLS:
         raise WorldError(

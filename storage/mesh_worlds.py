@@ -10,7 +10,7 @@ from typing import Final, Literal
 import numpy as np
 
 from ses_core.arrays import Float32Array
-from ses_core.errors import LogError, WorldError
+from ses_core.errors import LogError, NotAMapError, WorldError
 from ses_core.navigation import World
 from ses_core.settings import DecoderLimits
 from ses_core.worlds.identity import named_world
@@ -35,6 +35,7 @@ def read_mesh(path: Path, *, slicing: MeshSlicing, resolution: float) -> World:
     """Read a mesh and slice it into cells of `resolution` [m].
 
     Raises:
+        NotAMapError: It has no triangle: points or lines alone.
         WorldError: It cannot be read, or there is nothing to slice.
     """
     suffix = path.suffix.lower()
@@ -54,7 +55,8 @@ def _triangles(path: Path, suffix: str) -> Float32Array:
             ) as output:
                 triangles = np.load(output / "triangles.npy", allow_pickle=False)
         except (LogError, OSError, ValueError) as error:
-            raise WorldError(
+            is_empty = isinstance(error, LogError) and error.reason == "empty"
+            raise (NotAMapError if is_empty else WorldError)(
                 f"{path} cannot be read as a mesh: {error}, expected a whole {suffix} file of "
                 "triangles in metres"
             ) from error

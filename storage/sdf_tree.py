@@ -54,7 +54,7 @@ def sdf_tree(text: str, path: Path, *, without: Collection[str]) -> ET.Element:
         if not skipped:
             build(start, end, builder.data)
 
-    def build(start: Any, end: Any, data: Any) -> None:  # noqa: ANN401
+    def build(start: Any, end: Any, data: Any) -> None:
         # Handlers are exchanged: most of a saved world is skipped, and then they do almost nothing.
         parser.StartElementHandler = start
         parser.EndElementHandler = end

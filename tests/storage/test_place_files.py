@@ -244,7 +244,7 @@ def test_a_floor_that_cannot_be_is_refused(old: str, new: str, said: str, tmp_pa
         ({"resolution": np.float64(-1.0)}, "expected more than 0 m"),
         ({"origin": np.zeros(3)}, "has origin of shape"),
         ({"origin": np.array([np.nan, 0.0])}, "expected more than 0 m"),
-        ({"goal": None}, "cannot be read as a world"),
+        ({"goal": None}, "has no goal, expected the arrays"),
         ({"cells": np.array([[object()]])}, "cannot be read as a world"),
     ],
 )

@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
 from PIL import Image
 
 from ses_core.errors import WorldError
@@ -142,3 +143,14 @@ def test_real_maps_of_every_kind_are_read(
     assert len(worlds) == count
     assert all(np.mean(~world.grid.cells) > 0.0 for world in worlds)
     assert all(world.grid.width_m < 80.0 for world in worlds)
+
+
+def test_arrays_clouds_and_lines_are_passed_over_in_a_folder(tmp_path: Path) -> None:
+    _draw(tmp_path / "a.png")
+    np.savez(tmp_path / "arrays.npz", weights=np.zeros(3))
+    trimesh.PointCloud(np.eye(3)).export(tmp_path / "cloud.ply")
+    (tmp_path / "line.obj").write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
+    found = find_worlds([tmp_path], reading=Reading(resolution=0.1))
+    assert found.refused == ()
+    assert [path.name for path in found.passed_over] == ["arrays.npz", "cloud.ply", "line.obj"]
+    assert len(read_worlds([tmp_path], resolution=0.1)) == 1
