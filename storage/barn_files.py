@@ -7,6 +7,7 @@ path's start to beyond its end instead.
 
 import io
 import math
+import tokenize
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -51,8 +52,8 @@ def read_barn_array(path: Path, content: bytes) -> BarnArray:
         WorldError: It is no array of numbers.
     """
     try:
-        array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+        array: NDArray[Any] = np.load(io.BytesIO(_within_claims(content)), allow_pickle=False)
+    except (ValueError, OSError, EOFError, SyntaxError, tokenize.TokenError) as error:
         raise WorldError(f"{path} is no array of numbers: {first_line(error)}") from error
     if isinstance(array, np.ndarray) and array.dtype.kind in "biuf":
         if array.shape == (FIELD_CELLS, FIELD_CELLS) and np.isin(array, (0, 1)).all():
@@ -64,6 +65,24 @@ def read_barn_array(path: Path, content: bytes) -> BarnArray:
         f"{path} is no array of BARN's, expected its field of 30 x 30 zeros and ones or its path "
         "(K, 2) of cells"
     )
+
+
+def _within_claims(content: bytes) -> bytes:
+    """Give an array's file back if it holds what its header claims: memory is taken by that."""
+    stream = io.BytesIO(content)
+    version = np.lib.format.read_magic(stream)
+    if version not in ((1, 0), (2, 0)):
+        raise ValueError(f"version {version} of the format, expected 1.0 or 2.0")
+    is_first = version == (1, 0)
+    shape, _, dtype = (
+        np.lib.format.read_array_header_1_0(stream)
+        if is_first
+        else np.lib.format.read_array_header_2_0(stream)
+    )
+    claimed, held = math.prod(shape) * dtype.itemsize, len(content) - stream.tell()
+    if min(shape, default=0) < 0 or claimed > held:
+        raise ValueError(f"its header claims {shape} of {dtype}, but {held} bytes follow")
+    return content
 
 
 def barn_field(path: Path, field: BoolArray) -> World:

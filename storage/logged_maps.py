@@ -12,7 +12,7 @@ from ses_core.worlds.grids import coarsened, cut_to_free, levelled
 from ses_core.worlds.identity import named_world
 from storage.log_decoder import decode_map
 from storage.log_formats import SUFFIXES, detect_format
-from storage.world_files import named_errors
+from storage.world_files import first_line, named_errors
 
 LOG_SUFFIXES: Final = frozenset(SUFFIXES.values())
 
@@ -26,7 +26,10 @@ def read_logged_map(path: Path) -> World:
         NotAMapError: The log has no map.
         WorldError: It cannot be read.
     """
-    found = detect_format(path)
+    try:
+        found = detect_format(path)
+    except OSError as error:
+        raise WorldError(f"{path} cannot be read: {first_line(error)}") from error
     if found not in SUFFIXES:
         raise WorldError(f"{path} is no ROS log, expected the first bytes of a bag, db3 or mcap")
     with tempfile.TemporaryDirectory(prefix="ses-map-") as folder:
@@ -37,6 +40,8 @@ def read_logged_map(path: Path) -> World:
                 limits=DecoderLimits(),
                 workdir=Path(folder),
             )
+        except OSError as error:
+            raise WorldError(f"{path} cannot be read: {first_line(error)}") from error
         except LogError as error:
             kind = NotAMapError if error.reason == "missing_topic" else WorldError
             raise kind(f"{path} gives no map: {error}, expected one on a topic /map") from error

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from ses_core.arrays import IntArray
 from ses_core.errors import NotAMapError, WorldError
 from ses_core.navigation import World
+from ses_core.worlds.grids import require_usable
 from ses_core.worlds.identity import named_world
 from ses_core.worlds.mesh_slicing import DEFAULT_SLICING, MeshSlicing
 from storage.array_worlds import ARRAY_SUFFIX, read_array_world
@@ -54,8 +53,8 @@ class Reading:
     barn_course: BarnCourse = "protocol"
 
     def __post_init__(self) -> None:
-        if self.resolution is not None and not 0.0 < self.resolution < np.inf:
-            raise ValueError(f"resolution is {self.resolution:g} m per pixel, expected more than 0")
+        if self.resolution is not None:
+            require_usable(self.resolution)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,7 +136,11 @@ def require_resolution(file: Path, reading: Reading) -> None:
 
 def natural_order(name: str) -> list[tuple[int, str]]:
     """Sort `world_2` before `world_10`."""
-    return [(int(part) if part.isdecimal() else -1, part) for part in re.split(r"(\d+)", name)]
+    # A longer number is the larger one: no name is too long to become an int.
+    return [
+        (len(part.lstrip("0")), part.lstrip("0")) if part.isdecimal() else (-1, part)
+        for part in re.split(r"(\d+)", name)
+    ]
 
 
 def _read_content(name: Path, content: bytes, reading: Reading) -> World:
@@ -208,5 +211,5 @@ def _with_courses(
 
 def _number(name: str) -> int:
     """Give the number that a name ends in; -1 where it ends in none."""
-    found = re.search(r"(\d+)$", name)
+    found = re.search(r"(?<!\d)(\d{1,18})$", name)
     return int(found[1]) if found else -1

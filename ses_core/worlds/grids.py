@@ -17,11 +17,32 @@ and time of 5 cm ones, and no planner cell is finer."""
 
 _COARSE_M = 0.05
 
+_USABLE_M = (0.001, 10.0)
+"""No map has cells of less than a millimetre, and none of more than a house's width is of use."""
+
 _LEVEL_RAD = 1e-6
 
 
+def require_usable(resolution: float) -> None:
+    """Refuse a resolution [m per cell] that no map has.
+
+    Raises:
+        WorldError: It is none.
+    """
+    finest, coarsest = _USABLE_M
+    if not finest <= resolution <= coarsest:
+        raise WorldError(
+            f"resolution is {resolution:g} m per cell, expected {finest:g} to {coarsest:g}"
+        )
+
+
 def coarsened(grid: OccupancyGrid) -> OccupancyGrid:
-    """Give a grid no finer than needed; a cell is occupied if any part of it was."""
+    """Give a grid no finer than needed; a cell is occupied if any part of it was.
+
+    Raises:
+        WorldError: No map has its resolution.
+    """
+    require_usable(grid.resolution)
     if grid.resolution >= FINEST_M:
         return grid
     factor = max(1, round(_COARSE_M / grid.resolution))

@@ -54,7 +54,7 @@ def test_show_draws_the_pairs_that_an_evaluation_would_draw(maps: Path, tmp_path
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ("--resolution 0", "--resolution: resolution is 0 m per pixel, expected more than 0"),
+        ("--resolution 0", "--resolution: resolution is 0 m per cell, expected 0.001 to 10"),
         ("--slice-from 1", "--slice-from: slice from 1 to 0.5 m above the floor, expected two"),
         ("--up w", "--up: "),
     ],

@@ -115,3 +115,9 @@ def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
         read_logged_map(tmp_path / "fake.mcap")
     with pytest.raises(WorldError, match="gives no map"):
         read_logged_map(cut)
+
+
+def test_a_log_that_may_not_be_read_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.bag").symlink_to(tmp_path / "a.bag")
+    with pytest.raises(WorldError, match=r"a\.bag cannot be read"):
+        read_logged_map(tmp_path / "a.bag")

@@ -272,3 +272,19 @@ def test_an_image_is_read_where_it_is_light(tmp_path: Path) -> None:
     world = read_image(tmp_path / "a.png", resolution=place.grid.resolution)
     blocked = place.grid.cells | ~place.observed
     assert says_the_same(world, place, blocked, Pose2D(0.0, -2.5))
+
+
+@pytest.mark.parametrize("field", [6, 8])
+def test_an_archive_of_arrays_that_is_locked_is_refused(field: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    write_place(path, place_of_environment(environment(noise(3))), format="npz")
+    content = bytearray(path.read_bytes())
+    # The flag of encryption, or a method of compression that nobody has, in every entry.
+    for start, shift in ((b"PK\x03\x04", 0), (b"PK\x01\x02", 2)):
+        found = content.find(start)
+        while found >= 0:
+            content[found + field + shift] |= 1 if field == 6 else 0x60
+            found = content.find(start, found + 4)
+    path.write_bytes(content)
+    with pytest.raises(WorldError, match=r"a\.npz cannot be read as a world"):
+        read_array_world(path)

@@ -212,3 +212,38 @@ def test_all_three_hundred_original_worlds_are_read_from_their_archive() -> None
     assert [world.name for world in found.worlds] == [f"world_{number}" for number in range(300)]
     assert not found.refused
     assert found.worlds[150].world_id == loose[0].world_id
+
+
+def test_a_header_that_claims_more_than_there_is_costs_no_memory(tmp_path: Path) -> None:
+    def header(shape: str) -> bytes:
+        text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".encode()
+        text = text.ljust(117) + b"\n"
+        return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+
+    for shape in ("(1000000000000000, 2)", f"({10**30}, 2)", "(-1, 2)", "(3, 2)"):
+        (tmp_path / "path_1.npy").write_bytes(header(shape) + bytes(40))
+        with pytest.raises(WorldError, match=r"path_1\.npy is no array of numbers: its header"):
+            read_worlds([tmp_path / "path_1.npy"])
+
+
+def test_a_name_of_thousands_of_digits_is_a_name(tmp_path: Path) -> None:
+    name = "9" * 5000 + ".npy"
+    with tarfile.open(tmp_path / "a.tar", "w", format=tarfile.PAX_FORMAT) as archive:
+        for named in (name, "grid_10.npy", "grid_2.npy"):
+            content = _npy(np.roll(FIELD, len(named), axis=1))
+            member = tarfile.TarInfo(named)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    assert len(find_worlds([tmp_path / "a.tar"]).worlds) == 3
+    with pytest.raises(WorldError, match="has no path"):
+        find_worlds([tmp_path / "a.tar"], reading=Reading(barn_course="path"))
+
+
+def test_a_resolution_that_no_map_has_is_refused_in_one_line(tmp_path: Path) -> None:
+    for resolution in (1e-7, 0.0, -1.0, 11.0, math.nan, math.inf):
+        with pytest.raises(WorldError, match=r"m per cell, expected 0\.001 to 10$"):
+            Reading(resolution=resolution)
+    Image.fromarray(np.full((9, 9), 255, dtype=np.uint8)).save(tmp_path / "a.png")
+    (tmp_path / "a.yaml").write_text("image: a.png\nresolution: 1.0e-7\norigin: [0, 0, 0]\n")
+    with pytest.raises(WorldError, match=r"a\.yaml: resolution is 1e-07 m per cell"):
+        read_worlds([tmp_path / "a.yaml"])
