@@ -114,14 +114,19 @@ def read_pixels(
                 )
             is_deep, is_grey = image.mode.startswith("I"), image.mode in {"1", "L"}
             wanted = image if is_deep else image.convert("L" if is_grey else "RGBA")
-            pixels = np.asarray(wanted, dtype=np.float32)
+            pixels = np.asarray(wanted)
     except FileNotFoundError:
         raise
     except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError) as error:
         raise WorldError(f"{path} cannot be read as an image: {first_line(error)}") from error
     if is_grey or is_deep:
-        return pixels / (65535.0 if is_deep else 255.0), np.ones_like(pixels)
-    return pixels[..., :3].mean(axis=2) / 255.0, pixels[..., 3] / 255.0
+        lightness = pixels / np.float32(65535.0 if is_deep else 255.0)
+        return lightness, np.broadcast_to(np.float32(1.0), pixels.shape)
+    # Bytes until a pixel is one number: floats of every colour would take 16 bytes a pixel.
+    light = pixels[..., 0].astype(np.uint16)
+    light += pixels[..., 1]
+    light += pixels[..., 2]
+    return light / np.float32(3 * 255.0), pixels[..., 3] / np.float32(255.0)
 
 
 def _read_keys(path: Path) -> _MapServerFile:

@@ -1,4 +1,5 @@
 import math
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from PIL import Image
 from ses_core.arrays import ByteArray
 from ses_core.errors import WorldError
 from ses_core.occupancy import occupied_at
-from storage.world_files import read_image, read_map_server
+from storage.world_files import read_image, read_map_server, read_pixels
 from tests.shared_data import shared_data
 
 FREE, WALL, UNKNOWN = 254, 0, 205
@@ -200,3 +201,16 @@ def test_a_real_map_keeps_only_what_was_explored() -> None:
     assert world.grid.width_m == pytest.approx(16.4, abs=0.2)
     assert world.grid.height_m == pytest.approx(12.3, abs=0.2)
     assert -50.0 < world.grid.origin[0] < 50.0
+
+
+def test_colours_are_read_within_a_few_bytes_a_pixel(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (1000, 1000, 4), dtype=np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "plan.png")
+    tracemalloc.start()
+    lightness, opacity = read_pixels(tmp_path / "plan.png")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert np.allclose(lightness, pixels[..., :3].mean(axis=2) / 255.0, atol=1e-6)
+    assert np.allclose(opacity, pixels[..., 3] / 255.0)
+    assert (lightness.dtype, opacity.dtype) == (np.float32, np.float32)
+    assert peak < 20 * lightness.size
