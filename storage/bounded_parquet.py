@@ -5,7 +5,8 @@ size. Claims are checked before anything is read; what lies about itself meets t
 process that reads it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pyarrow as pa
@@ -19,8 +20,17 @@ _ROW_BYTES = 8
 """A row of any of our tables takes more than this; so many more rows than bytes are a lie."""
 
 
-def read_bounded(path: Path, table: str, columns: Sequence[str], *, byte_limit: int) -> pa.Table:
-    """Read some columns of a file of one of our tables.
+@contextmanager
+def bounded_file(
+    path: Path, table: str, *, check: Callable[[pa.Schema], None], byte_limit: int
+) -> Iterator[pq.ParquetFile]:
+    """Open a file whose schema and claims are as expected; what goes wrong in reading it has names.
+
+    Args:
+        path: File to open.
+        table: What it is called in errors.
+        check: Raises SchemaError for other columns than expected.
+        byte_limit: Most bytes it may claim to hold.
 
     Raises:
         LogError: `truncated`, `checksum`, `schema_conflict`, `size_limit` or `memory_limit`.
@@ -33,9 +43,9 @@ def read_bounded(path: Path, table: str, columns: Sequence[str], *, byte_limit: 
             thrift_string_size_limit=_FOOTER_LIMIT,
             thrift_container_size_limit=_FOOTER_LIMIT,
         ) as file:
-            check_schema(file.schema_arrow, table, source=f"{table}.parquet")
+            check(file.schema_arrow)
             _check_claims(file.metadata, table, byte_limit)
-            rows = file.read(columns=list(columns), use_threads=False)
+            yield file
     except SchemaError as error:
         raise LogError("schema_conflict", str(error)) from error
     except pa.ArrowMemoryError as error:
@@ -44,6 +54,20 @@ def read_bounded(path: Path, table: str, columns: Sequence[str], *, byte_limit: 
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         reason = "checksum" if "crc" in text.lower() else "truncated"
         raise LogError(reason, f"{table}.parquet is damaged: {text}") from error
+
+
+def read_bounded(path: Path, table: str, columns: Sequence[str], *, byte_limit: int) -> pa.Table:
+    """Read some columns of a file of one of our tables.
+
+    Raises:
+        LogError: `truncated`, `checksum`, `schema_conflict`, `size_limit` or `memory_limit`.
+    """
+
+    def check(schema: pa.Schema) -> None:
+        check_schema(schema, table, source=f"{table}.parquet")
+
+    with bounded_file(path, table, check=check, byte_limit=byte_limit) as file:
+        rows = file.read(columns=list(columns), use_threads=False)
     if rows.nbytes > byte_limit:
         raise LogError("memory_limit", f"{table}.parquet holds {rows.nbytes} bytes")
     for name in columns:

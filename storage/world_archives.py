@@ -44,6 +44,11 @@ def archived_files(path: Path) -> Iterator[tuple[Path, bytes]]:
             for number, member in enumerate(archive):
                 if number >= _MOST_MEMBERS:
                     raise WorldError(f"{path} holds more than {_MOST_MEMBERS} files")
+                if member.issparse():
+                    raise WorldError(
+                        f"{path} holds {member.name} with holes in it, expected plain files: pack "
+                        "it without --sparse"
+                    )
                 file = archive.extractfile(member) if member.isreg() else None
                 if file is None:
                     continue

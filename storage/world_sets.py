@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ses_core.errors import NotAMapError, WorldError
 from ses_core.navigation import World
+from ses_core.worlds.grids import require_together
 from storage.durable_files import replace_file, sync_file, sync_folder, temporary_name
 from storage.world_archives import is_archive
 from storage.world_files import IMAGE_SUFFIXES, MAP_SUFFIXES
@@ -120,6 +121,7 @@ class _Search:
     worlds: dict[str, World] = field(default_factory=dict)
     passed_over: list[Path] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
+    cells: int = 0
 
     def take(self, file: Path) -> None:
         """Read a file that must hold worlds."""
@@ -135,15 +137,20 @@ class _Search:
         """Read a file that lies in a folder."""
         require_resolution(file, self.reading)
         try:
-            self._add(read_world_file(file, self.reading))
+            worlds = read_world_file(file, self.reading)
         except NotAMapError:
             self.passed_over.append(file)
         except WorldError as error:
             self.refused.append(str(error))
+        else:
+            self._add(worlds)
 
     def _add(self, worlds: Sequence[World]) -> None:
         for world in worlds:
-            self.worlds.setdefault(world.world_id, world)
+            if world.world_id not in self.worlds:
+                self.worlds[world.world_id] = world
+                self.cells += world.grid.cells.size
+        require_together(self.cells)
 
 
 def _folder_files(path: Path, *, part: str | None, passed_over: list[Path]) -> Iterator[Path]:

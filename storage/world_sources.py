@@ -10,7 +10,7 @@ from typing import Final
 from ses_core.arrays import IntArray
 from ses_core.errors import NotAMapError, WorldError
 from ses_core.navigation import World
-from ses_core.worlds.grids import require_usable
+from ses_core.worlds.grids import require_together, require_usable
 from ses_core.worlds.identity import named_world
 from ses_core.worlds.mesh_slicing import DEFAULT_SLICING, MeshSlicing
 from storage.array_worlds import ARRAY_SUFFIX, read_array_world
@@ -105,6 +105,7 @@ def read_archive(file: Path, reading: Reading) -> Archive:
     passed_over: list[Path] = []
     refused: list[str] = []
     paths: dict[int, IntArray] = {}
+    cells = 0
     for name, content in archived_files(file):
         if name.suffix.lower() not in _PACKABLE:
             passed_over.append(name)
@@ -115,11 +116,14 @@ def read_archive(file: Path, reading: Reading) -> Archive:
                 paths[_number(name.stem)] = path
                 passed_over.append(name)
             else:
-                worlds.append(_read_content(name, content, reading))
+                world = _read_content(name, content, reading)
+                worlds.append(world)
+                cells += world.grid.cells.size
         except NotAMapError:
             passed_over.append(name)
         except WorldError as error:
             refused.append(str(error))
+        require_together(cells)
     worlds.sort(key=lambda world: natural_order(world.name))
     return Archive(
         worlds=tuple(_with_courses(worlds, lambda: paths, reading)),

@@ -11,6 +11,9 @@ from ses_core.occupancy import OccupancyGrid
 
 MOST_CELLS = 64_000_000
 
+_MOST_TOGETHER = 4_000_000_000
+"""A cell takes a byte of memory; all 35 000 plans of HouseExpo have some 3 000 million."""
+
 FINEST_M = 0.025
 """Maps finer than this are coarsened: floor plans of 1 cm pixels would cost 25 times the memory
 and time of 5 cm ones, and no planner cell is finer."""
@@ -33,6 +36,19 @@ def require_usable(resolution: float) -> None:
     if not finest <= resolution <= coarsest:
         raise WorldError(
             f"resolution is {resolution:g} m per cell, expected {finest:g} to {coarsest:g}"
+        )
+
+
+def require_together(cells: int) -> None:
+    """Refuse worlds that have more cells together than fit into memory.
+
+    Raises:
+        WorldError: They have.
+    """
+    if cells > _MOST_TOGETHER:
+        raise WorldError(
+            f"these worlds have more than {_MOST_TOGETHER} cells together, expected fewer: read "
+            "them in parts or with coarser cells"
         )
 
 

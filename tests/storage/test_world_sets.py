@@ -1,15 +1,20 @@
+import tarfile
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import trimesh
 from PIL import Image
 
 from ses_core.errors import WorldError
 from ses_core.navigation import World
+from ses_core.worlds import grids
 from ses_core.worlds.cellular_automata import generate_barn
 from ses_core.worlds.homes import generate_homes
+from storage import world_tables
 from storage.world_sets import find_worlds, read_worlds, write_world_set
 from storage.world_sources import Reading
 from tests.shared_data import shared_data
@@ -154,3 +159,48 @@ def test_arrays_clouds_and_lines_are_passed_over_in_a_folder(tmp_path: Path) -> 
     assert found.refused == ()
     assert [path.name for path in found.passed_over] == ["arrays.npz", "cloud.ply", "line.obj"]
     assert len(read_worlds([tmp_path], resolution=0.1)) == 1
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"resolution_m": float("nan")}, "expected more than 0 m"),
+        ({"resolution_m": 0.0}, "expected more than 0 m"),
+        ({"origin_x_m": float("inf")}, "two numbers"),
+        ({"goal_y_m": None}, "expected five numbers or none"),
+        ({"start_x_m": None}, "expected five numbers or none"),
+        ({"height_cells": 10**6, "width_cells": 10**6, "cells": b"a"}, "expected at most"),
+        ({"height_cells": -1, "width_cells": -8, "cells": b"a"}, "bytes of cells in"),
+        ({"world_id": "a" * (1 << 20)}, "unpacks to more than"),
+    ],
+)
+def test_a_world_set_that_cannot_be_is_refused(
+    tmp_path: Path, changed: dict[str, object], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_world_set(tmp_path, _worlds()[:1])
+    table = pq.read_table(tmp_path / "worlds.parquet")
+    rows = [{**row, **changed} for row in table.to_pylist()] * 20
+    pq.write_table(pa.Table.from_pylist(rows, schema=table.schema), tmp_path / "worlds.parquet")
+    monkeypatch.setattr(world_tables, "_MOST_BYTES", 4 << 20)
+    with pytest.raises(WorldError, match=said):
+        read_worlds([tmp_path])
+
+
+@pytest.mark.parametrize("kind", ["folder", "archive", "set"])
+def test_more_cells_than_fit_into_memory_are_refused(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(3):
+        np.save(tmp_path / f"grid_{number}.npy", np.eye(30, k=number))
+    path = tmp_path
+    if kind == "archive":
+        path = tmp_path / "a.tar"
+        with tarfile.open(path, "w") as archive:
+            for file in sorted(tmp_path.glob("*.npy")):
+                archive.add(file)
+    elif kind == "set":
+        path = tmp_path / "set"
+        write_world_set(path, read_worlds([tmp_path]))
+    monkeypatch.setattr(grids, "_MOST_TOGETHER", 94 * 30 * 2)
+    with pytest.raises(WorldError, match="these worlds have more than 5640 cells together"):
+        find_worlds([path])

@@ -247,3 +247,17 @@ def test_a_resolution_that_no_map_has_is_refused_in_one_line(tmp_path: Path) -> 
     (tmp_path / "a.yaml").write_text("image: a.png\nresolution: 1.0e-7\norigin: [0, 0, 0]\n")
     with pytest.raises(WorldError, match=r"a\.yaml: resolution is 1e-07 m per cell"):
         read_worlds([tmp_path / "a.yaml"])
+
+
+def test_a_file_with_holes_in_an_archive_is_refused(tmp_path: Path) -> None:
+    # One byte of content; the other 200 MiB are a hole.
+    member = tarfile.TarInfo("grid_1.npy")
+    member.type, member.size = tarfile.GNUTYPE_SPARSE, 1
+    header = bytearray(member.tobuf(tarfile.GNU_FORMAT))
+    header[386:410] = b"%011o\0%011o\0" % (0, 1)
+    header[483:495] = b"%011o\0" % (200 << 20)
+    header[148:156] = b" " * 8
+    header[148:156] = b"%06o\0 " % sum(header)
+    (tmp_path / "a.tar").write_bytes(bytes(header) + bytes(512) + bytes(1024))
+    with pytest.raises(WorldError, match=r"grid_1\.npy with holes in it, expected plain files"):
+        read_worlds([tmp_path / "a.tar"])
