@@ -24,6 +24,9 @@ from ses_core.worlds.identity import named_world
 IMAGE_SUFFIXES = frozenset({".png", ".pgm", ".bmp", ".jpg", ".jpeg", ".tif", ".tiff"})
 MAP_SUFFIXES = frozenset({".yaml", ".yml"})
 
+_IMAGE_FORMATS = ("PNG", "PPM", "BMP", "JPEG", "TIFF", "GIF", "WEBP")
+"""Whatever its name says, nothing else is opened: Pillow would run Ghostscript for an EPS."""
+
 FREE_THRESHOLD = 0.196
 """map_server's default: a pixel less dark than this share is free."""
 
@@ -106,7 +109,7 @@ def read_pixels(
         WorldError: It is no image, or too large.
     """
     try:
-        with Image.open(content or path) as image:
+        with Image.open(content or path, formats=_IMAGE_FORMATS) as image:
             if image.width * image.height > MOST_CELLS:
                 raise WorldError(
                     f"{path} has {image.width} x {image.height} pixels, "

@@ -214,3 +214,10 @@ def test_colours_are_read_within_a_few_bytes_a_pixel(tmp_path: Path) -> None:
     assert np.allclose(opacity, pixels[..., 3] / 255.0)
     assert (lightness.dtype, opacity.dtype) == (np.float32, np.float32)
     assert peak < 20 * lightness.size
+
+
+def test_a_picture_that_would_be_run_as_a_program_is_not_opened(tmp_path: Path) -> None:
+    Image.fromarray(np.full((9, 9), 255, dtype=np.uint8)).save(tmp_path / "a.eps")
+    (tmp_path / "a.eps").rename(tmp_path / "a.png")
+    with pytest.raises(WorldError, match=r"a\.png cannot be read as an image: cannot identify"):
+        read_pixels(tmp_path / "a.png")
