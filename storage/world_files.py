@@ -38,6 +38,14 @@ OCCUPIED_PERCENT = 50.0
 
 LARGEST_FILE_MIB = 256
 
+_LARGEST_YAML_MIB = 1
+"""A map's keys take some hundred bytes; parsing takes a second and 100 MB per MiB."""
+
+_DEEPEST_YAML = 64
+
+# PyYAML brings the fast one where it was built with libyaml.
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
 
 class _MapServerFile(BaseModel):
     """The keys of a map_server YAML."""
@@ -134,19 +142,32 @@ def read_pixels(
 
 def _read_keys(path: Path) -> _MapServerFile:
     try:
-        content = yaml.safe_load(read_text(path))
+        content = _yaml(path)
         if not isinstance(content, dict) or "image" not in content:
             raise NotAMapError(
                 f"{path} is no map_server file, expected the keys image, resolution and origin"
             )
         return _MapServerFile.model_validate(content)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise WorldError(f"{path} is no YAML: {first_line(error)}") from error
     except ValidationError as error:
         problem = error.errors()[0]
         key = ".".join(map(str, problem["loc"])) or "content"
         said = problem["msg"].removeprefix("Value error, ").lower()
         raise WorldError(f"{path} is no map_server file: {key}: {said}") from error
+
+
+def _yaml(path: Path) -> object:
+    text = read_text(path, most_mib=_LARGEST_YAML_MIB, too_large=NotAMapError)
+    try:
+        depth = 0
+        # libyaml's loader calls itself in C, where too deep is a crash: its events come flat.
+        for event in yaml.parse(text, Loader=_Loader):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > _DEEPEST_YAML:
+                raise NotAMapError(f"{path} is no YAML of a map: it nests {depth} deep")
+        return yaml.load(text, Loader=_Loader)
+    except (yaml.YAMLError, ValueError) as error:
+        raise WorldError(f"{path} is no YAML: {first_line(error)}") from error
 
 
 def _occupied(keys: _MapServerFile, lightness: Float32Array, opacity: Float32Array) -> BoolArray:
@@ -173,15 +194,17 @@ def named_errors(path: Path) -> Iterator[None]:
         raise type(error)(f"{path}: {error}") from error
 
 
-def read_text(path: Path) -> str:
+def read_text(
+    path: Path, *, most_mib: int = LARGEST_FILE_MIB, too_large: type[WorldError] = WorldError
+) -> str:
     """Read a text file of reasonable size.
 
     Raises:
-        WorldError: It is too large, or no UTF-8 text.
+        WorldError: It is too large (or what `too_large` says), or no UTF-8 text.
     """
     try:
-        if path.stat().st_size > LARGEST_FILE_MIB << 20:
-            raise WorldError(f"{path} is larger than {LARGEST_FILE_MIB} MiB")
+        if path.stat().st_size > most_mib << 20:
+            raise too_large(f"{path} is larger than {most_mib} MiB")
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise WorldError(f"{path} cannot be read as text: {first_line(error)}") from error

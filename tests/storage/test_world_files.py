@@ -1,4 +1,5 @@
 import math
+import time
 import tracemalloc
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from ses_core.arrays import ByteArray
-from ses_core.errors import WorldError
+from ses_core.errors import NotAMapError, WorldError
 from ses_core.occupancy import occupied_at
 from storage.world_files import read_image, read_map_server, read_pixels
 from tests.shared_data import shared_data
@@ -70,6 +71,7 @@ def test_a_negated_map_reads_dark_as_free(tmp_path: Path) -> None:
         ("{", "is no YAML"),
         ("a: &a [*a]\n", "expected the keys image"),
         ("[" * 2000, "is no YAML"),
+        ("a: 2026-99-99\n", "is no YAML"),
     ],
 )
 def test_a_bad_map_is_refused_with_its_reason(tmp_path: Path, content: str, said: str) -> None:
@@ -221,3 +223,20 @@ def test_a_picture_that_would_be_run_as_a_program_is_not_opened(tmp_path: Path) 
     (tmp_path / "a.eps").rename(tmp_path / "a.png")
     with pytest.raises(WorldError, match=r"a\.png cannot be read as an image: cannot identify"):
         read_pixels(tmp_path / "a.png")
+
+
+def test_a_large_or_deep_yaml_is_refused_in_a_moment(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    for text, said in (
+        ("[" * 500_000 + "]" * 500_000, "nests 65 deep"),
+        ("- " * 500_000, "nests 65 deep"),
+        ("a: 1\n" * 220_000, "is larger than 1 MiB"),
+    ):
+        path.write_text(text)
+        with pytest.raises(NotAMapError, match=said):
+            read_map_server(path)
+    path.write_text("".join(f"a{number}: 1\n" for number in range(20_000)))
+    started = time.process_time()
+    with pytest.raises(NotAMapError):
+        read_map_server(path)
+    assert time.process_time() - started < 3.0
