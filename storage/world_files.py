@@ -140,6 +140,16 @@ def read_pixels(
     return light / np.float32(3 * 255.0), pixels[..., 3] / np.float32(255.0)
 
 
+def named_picture(path: Path) -> Path | None:
+    """Give the picture that a map_server YAML names; None where it is none."""
+    try:
+        content = _yaml(path)
+    except WorldError:
+        return None
+    named = content.get("image") if isinstance(content, dict) else None
+    return path.parent / named if isinstance(named, str) else None
+
+
 def _read_keys(path: Path) -> _MapServerFile:
     try:
         content = _yaml(path)

@@ -1,6 +1,7 @@
 """World sets: folders of `worlds.parquet` and a preview, and whatever else holds worlds."""
 
 import csv
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +11,7 @@ from ses_core.navigation import World
 from ses_core.worlds.grids import require_together
 from storage.durable_files import replace_file, sync_file, sync_folder, temporary_name
 from storage.world_archives import is_archive
-from storage.world_files import IMAGE_SUFFIXES, MAP_SUFFIXES
+from storage.world_files import IMAGE_SUFFIXES, MAP_SUFFIXES, named_picture
 from storage.world_sources import (
     FOLDER_SUFFIXES,
     Reading,
@@ -163,16 +164,22 @@ def _folder_files(path: Path, *, part: str | None, passed_over: list[Path]) -> I
         key=lambda file: natural_order(file.name),
     )
     maps = [file for file in files if file.suffix.lower() in MAP_SUFFIXES]
-    described = {file.stem for file in maps}
+    described = {_plain(picture) for file in maps if (picture := named_picture(file)) is not None}
     chosen = _names_of_part(path, part) if part is not None else None
     for file in files:
         suffix = file.suffix.lower()
-        if file.name == SPLIT_FILE or (suffix in IMAGE_SUFFIXES and file.stem in described):
+        is_described = suffix in IMAGE_SUFFIXES and _plain(file) in described
+        if file.name == SPLIT_FILE or is_described:
             continue
         if suffix not in FOLDER_SUFFIXES:
             passed_over.append(file)
         elif chosen is None or file.stem in chosen:
             yield file
+
+
+def _plain(path: Path) -> str:
+    """Write a path without detours; the disk is not asked, as a name may be any text."""
+    return os.path.abspath(path)  # noqa: PTH100
 
 
 def _names_of_part(directory: Path, part: str) -> frozenset[str]:

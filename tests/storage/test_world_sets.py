@@ -204,3 +204,18 @@ def test_more_cells_than_fit_into_memory_are_refused(
     monkeypatch.setattr(grids, "_MOST_TOGETHER", 94 * 30 * 2)
     with pytest.raises(WorldError, match="these worlds have more than 5640 cells together"):
         find_worlds([path])
+
+
+def test_a_yaml_hides_the_picture_it_names_and_no_other(tmp_path: Path) -> None:
+    for free, name in enumerate(("floor", "scan", "plan"), start=1):
+        _draw(tmp_path / f"{name}.png", free=free)
+    keys = "resolution: 0.2\norigin: [0, 0, 0]\n"
+    (tmp_path / "floor.yaml").write_text(f"image: ../{tmp_path.name}/./scan.png\n{keys}")
+    (tmp_path / "plan.yaml").write_text("title: no map\n")
+    found = find_worlds([tmp_path], reading=Reading(resolution=0.1))
+    assert [(world.name, world.source) for world in found.worlds] == [
+        ("floor", "image"),
+        ("floor", "map_server"),
+        ("plan", "image"),
+    ]
+    assert [path.name for path in found.passed_over] == ["plan.yaml"]
