@@ -15,14 +15,15 @@ from ses_core.geometry import Pose2D
 from ses_core.occupancy import OccupancyGrid
 from ses_core.worlds.grids import MOST_CELLS
 
-FLOOR_PREFIX, START_MODEL, GOAL_MODEL = "floor_", "start", "goal"
+# Nobody else's models are called so: any world may have a floor_10x10 and a start.
+FLOOR_PREFIX, START_MODEL, GOAL_MODEL = "ses_floor_", "ses_start", "ses_goal"
 
 _FLOOR_NAME = re.compile(FLOOR_PREFIX + r"(\d{1,8})x(\d{1,8})")
 
 
 def is_marked(text: str) -> bool:
     """Tell whether SDF may have marks, whose visuals then have to be read."""
-    return f'name="{FLOOR_PREFIX}' in text
+    return FLOOR_PREFIX in text
 
 
 def declared_floor(world: ET.Element, path: Path) -> OccupancyGrid | None:
@@ -30,7 +31,8 @@ def declared_floor(world: ET.Element, path: Path) -> OccupancyGrid | None:
     for model in world.findall("model"):
         named = _FLOOR_NAME.fullmatch(model.get("name", ""))
         size = model.findtext("link/visual/geometry/box/size")
-        if named is None or size is None:
+        # What is marked is ground: a model to bump into is none of our marks.
+        if named is None or size is None or next(model.iter("collision"), None) is not None:
             continue
         width, height = int(named[1]), int(named[2])
         length_m, width_m, _ = sdf_numbers(size, 3, path)

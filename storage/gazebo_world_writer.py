@@ -2,8 +2,9 @@
 
 SDF 1.6 is what both read, and nothing is fetched: ground, sun and materials stand in the file.
 The obstacles are one static model `walls` of boxes, merged cells. Flat coloured marks without
-collision say what SDF has no word for: `floor_<W>x<H>` has its pose in the grid's lower left corner
-and spans W x H cells, `start` and `goal` lie where to drive. What was not observed is open ground.
+collision say what SDF has no word for: `ses_floor_<W>x<H>` has its pose in the grid's lower left
+corner and spans W x H cells, `ses_start` and `ses_goal` lie where to drive. What was not observed
+is open ground.
 """
 
 import re

@@ -183,3 +183,24 @@ def test_models_nested_too_deep_are_refused_in_one_line(tmp_path: Path) -> None:
     deep = "<model>" * 100_000 + "</model>" * 100_000
     with pytest.raises(WorldError, match="nests elements more than 64 deep"):
         read_gazebo_world(_write(tmp_path, deep))
+
+
+@pytest.mark.parametrize("name", ["floor_10x10", "ses_floor_10x10"])
+def test_a_strangers_floor_is_no_mark_of_ours(tmp_path: Path, name: str) -> None:
+    posts = _box(0, 0, 0, "1 1 1"), _box(20, 0, 0, "1 1 1")
+    box = "<geometry><box><size>10 10 0.01</size></box></geometry>"
+    floor = (
+        f'<model name="{name}"><link name="l"><visual name="v">{box}</visual>'
+        f'<collision name="c">{box}</collision></link></model>'
+    )
+    marks = _box(5, 5, 0, "1 1 1"), _box(8, 8, 0, "1 1 1")
+    named = [
+        mark.replace("'box'", f"'{model}'")
+        for mark, model in zip(marks, ("start", "goal"), strict=True)
+    ]
+    for text in (floor, floor.replace(f'<collision name="c">{box}</collision>', "")):
+        if name.startswith("ses") and "collision" not in text:
+            continue
+        world = read_gazebo_world(_write(tmp_path, *posts, text, *named))
+        assert world.grid.width_m == pytest.approx(21.0)
+        assert world.course is None

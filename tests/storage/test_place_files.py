@@ -178,11 +178,11 @@ def test_a_gazebo_world_needs_nothing_but_itself_and_few_boxes(tmp_path: Path) -
     assert not list(sdf.iter("include"))
     assert not list(sdf.iter("uri"))
     models = {model.get("name"): model for model in sdf.findall("world/model")}
-    assert set(models) == {"ground_plane", "walls", "floor_30x30", "start", "goal"}
+    assert set(models) == {"ground_plane", "walls", "ses_floor_30x30", "ses_start", "ses_goal"}
     assert all(model.findtext("static") == "1" for model in models.values())
     assert len(models["walls"].findall("link/collision")) == 3
     assert len(models["walls"].findall("link/visual")) == 3
-    for mark in ("floor_30x30", "start", "goal"):
+    for mark in ("ses_floor_30x30", "ses_start", "ses_goal"):
         assert not list(models[mark].iter("collision"))
 
 
@@ -219,9 +219,9 @@ def test_a_hostile_name_stays_text(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("floor_30x30", "floor_0x30", "expected 1 to"),
-        ("floor_30x30", "floor_99999x99999", "expected 1 to"),
-        ("floor_30x30", "floor_30x20", "expected square cells"),
+        ("ses_floor_30x30", "ses_floor_0x30", "expected 1 to"),
+        ("ses_floor_30x30", "ses_floor_99999x99999", "expected 1 to"),
+        ("ses_floor_30x30", "ses_floor_30x20", "expected square cells"),
         ("<size>5.0 5.0 0.002", "<size>5.0 wide 0.002", "expected 3 numbers"),
         ("<size>5.0 5.0 0.002", "<size>-5.0 -5.0 0.002", "expected square cells"),
     ],
