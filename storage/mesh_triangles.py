@@ -33,7 +33,11 @@ def decode_triangles(file: Path, output: Path, *, format: str) -> None:  # noqa:
     pieces = []
     for transform, mesh in parts:
         corners = np.asarray(mesh.vertices) @ transform[:3, :3].T + transform[:3, 3]
-        pieces.append(corners.astype(np.float32)[np.asarray(mesh.faces)])
+        faces = np.asarray(mesh.faces)
+        if np.linalg.det(transform[:3, :3]) < 0.0:
+            # A mirror turns faces inside out: they are wound back.
+            faces = faces[:, ::-1]
+        pieces.append(corners.astype(np.float32)[faces])
     triangles = np.concatenate(pieces) if pieces else np.zeros((0, 3, 3), dtype=np.float32)
     triangles = triangles[np.isfinite(triangles).all(axis=(1, 2))]
     if not len(triangles):

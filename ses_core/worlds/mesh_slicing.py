@@ -23,6 +23,9 @@ UpAxis = Literal["auto", "x", "y", "z"]
 _FLOOR_DEPTH_M = 0.2
 """A floor may lie this much deeper than its usual height: scanned floors are not level."""
 
+_FLOOR_THICKNESS_M = 0.001
+"""What is sliced from the floor itself starts this much above it, or the floor is in the way."""
+
 _LEVEL = 0.9
 """Vertical part of the normal from which a face counts as level."""
 
@@ -79,8 +82,11 @@ def slice_mesh(
     base = slicing.floor if floor is None else floor
     assert base is not None
     bottom, top = heights.min(axis=1) - base, heights.max(axis=1) - base
-    ground = upright[(steepness > _LEVEL) & (top > -_FLOOR_DEPTH_M) & (bottom < slicing.low)]
-    obstacles = upright[(top > slicing.low) & (bottom < slicing.high)]
+    low = max(slicing.low, _FLOOR_THICKNESS_M)
+    # Whichever way round its corners go: many files do not care.
+    is_level = np.abs(steepness) > _LEVEL
+    ground = upright[is_level & (top > -_FLOOR_DEPTH_M) & (bottom < low)]
+    obstacles = upright[(top > low) & (bottom < slicing.high)]
     origin, shape = _frame([ground, obstacles], resolution)
     free = np.zeros(shape, dtype=np.bool_)
     if len(ground):
@@ -88,7 +94,7 @@ def slice_mesh(
             free,
             ground,
             low=base - _FLOOR_DEPTH_M,
-            high=base + slicing.low,
+            high=base + low,
             origin=origin,
             resolution=resolution,
         )
@@ -99,7 +105,7 @@ def slice_mesh(
     mark_slab(
         occupied,
         obstacles,
-        low=base + slicing.low,
+        low=base + low,
         high=base + slicing.high,
         origin=origin,
         resolution=resolution,
@@ -126,8 +132,13 @@ def _faces(triangles: Float32Array) -> tuple[FloatArray, FloatArray]:
 
 
 def _floor(heights: Float32Array, steepness: FloatArray, areas: FloatArray) -> float:
-    """Find the lowest height at which a large level surface faces up; else the lowest point."""
-    level = steepness > _LEVEL
+    """Find the lowest height at which a large level surface faces up; else the lowest point.
+
+    Where hardly any faces up, the file has its floor wound the other way.
+    """
+    level, ceiling = steepness > _LEVEL, steepness < -_LEVEL
+    if areas[level].sum() < _FLOOR_SHARE * areas[ceiling].sum():
+        level = ceiling
     if not level.any():
         return float(heights.min())
     found, weights = heights[level].astype(np.float64), areas[level]

@@ -96,3 +96,13 @@ def test_a_mesh_larger_than_allowed_is_not_even_opened(
     monkeypatch.setattr(mesh_worlds, "MESH_LIMITS", limits)
     with pytest.raises(WorldError, match="expected at most 0 MiB"):
         read_mesh(tmp_path / "room.stl", slicing=MeshSlicing(), resolution=CELL_M)
+
+
+def test_a_mirrored_part_of_a_scene_keeps_its_outside(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box(), transform=np.diag((-1.0, 1.0, 1.0, 1.0)))
+    scene.export(tmp_path / "box.glb")
+    decode_triangles(tmp_path / "box.glb", tmp_path, format="glb")
+    triangles = np.load(tmp_path / "triangles.npy", allow_pickle=False)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    assert (np.einsum("ij,ij->i", normals, triangles.mean(axis=1)) > 0.0).all()

@@ -81,6 +81,24 @@ def test_walls_without_a_floor_stand_on_the_ground_around_them() -> None:
     assert 0 < np.count_nonzero(~cells) < cells.size
 
 
+@pytest.mark.parametrize("height", [0.0, 2.6, 77.7])
+def test_a_slice_from_the_floor_itself_has_ground(height: float) -> None:
+    raised = np.array((0, 0, height), dtype=np.float32)
+    chest = box((1, 1, 0), (2, 2, 0.05))
+    cells = _slice(GROUND + raised, chest + raised, low=0.0).cells
+    assert np.count_nonzero(cells) == 100
+    assert cells.shape == (40, 40)
+
+
+def test_faces_wound_the_other_way_are_floor_too() -> None:
+    sheet = GROUND[(GROUND[:, :, 2] == 0.0).all(axis=1)]
+    chest = box((1, 1, 0), (2, 2, 0.6))
+    expected = _slice(sheet, chest).cells
+    assert np.count_nonzero(expected) == 100
+    for tiles in (sheet[:, ::-1], np.concatenate((sheet[:1], sheet[1:, ::-1]))):
+        assert np.array_equal(_slice(tiles, chest).cells, expected)
+
+
 def test_what_is_no_building_is_refused() -> None:
     with pytest.raises(WorldError, match="is it in metres"):
         _slice(GROUND * 1000, resolution=0.05)
