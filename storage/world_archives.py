@@ -23,6 +23,8 @@ _MOST_BYTES = 1 << 30
 _MOST_MEMBERS = 200_000
 _DICTIONARY_BYTES = 256 << 20
 _BLOCK = 1 << 20
+_PACKED_BLOCK = 1 << 16
+"""What is left of it is copied for each stream that ends in it, and these can be tiny."""
 
 
 def is_archive(path: Path) -> bool:
@@ -103,22 +105,36 @@ class _Xz(io.RawIOBase):
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb")
-        self._decompressor = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=_DICTIONARY_BYTES)
+        self._decompressor = _xz_stream()
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
-        while not self._decompressor.eof:
-            packed = self._file.read(_BLOCK) if self._decompressor.needs_input else b""
-            if not packed and self._decompressor.needs_input:
-                raise EOFError("it ends early")
+        while True:
+            packed = b""
+            if self._decompressor.eof:
+                # Tools that pack in parallel write streams one after another, padded by zeros.
+                packed = self._decompressor.unused_data.lstrip(b"\0")
+                while not packed:
+                    packed = self._file.read(_PACKED_BLOCK)
+                    if not packed:
+                        return 0
+                    packed = packed.lstrip(b"\0")
+                self._decompressor = _xz_stream()
+            elif self._decompressor.needs_input:
+                packed = self._file.read(_PACKED_BLOCK)
+                if not packed:
+                    raise EOFError("it ends early")
             content = self._decompressor.decompress(packed, max_length=len(buffer))
             if content:
                 buffer[: len(content)] = content
                 return len(content)
-        return 0
 
     def close(self) -> None:
         self._file.close()
         super().close()
+
+
+def _xz_stream() -> lzma.LZMADecompressor:
+    return lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=_DICTIONARY_BYTES)

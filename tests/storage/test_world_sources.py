@@ -261,3 +261,20 @@ def test_a_file_with_holes_in_an_archive_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.tar").write_bytes(bytes(header) + bytes(512) + bytes(1024))
     with pytest.raises(WorldError, match=r"grid_1\.npy with holes in it, expected plain files"):
         read_worlds([tmp_path / "a.tar"])
+
+
+@pytest.mark.parametrize("suffix", ["xz", "gz"])
+def test_streams_one_after_another_are_one_archive(tmp_path: Path, suffix: str) -> None:
+    whole = _tar(
+        tmp_path / "a.tar", {"grid_1.npy": _npy(FIELD), "grid_2.npy": _npy(np.rot90(FIELD, 2))}
+    ).read_bytes()
+    pack = lzma.compress if suffix == "xz" else gzip.compress
+    streams = [pack(whole[start : start + 3000]) for start in range(0, len(whole), 3000)]
+    padding = bytes(8) if suffix == "xz" else b""
+    packed = padding.join(streams)
+    path = tmp_path / f"a.tar.{suffix}"
+    path.write_bytes(packed + padding)
+    assert [world.name for world in find_worlds([path]).worlds] == ["grid_1", "grid_2"]
+    path.write_bytes(packed[: len(packed) - len(streams[-1]) - 40])
+    with pytest.raises(WorldError, match="cannot be read as an archive"):
+        find_worlds([path])
