@@ -14,6 +14,7 @@ from storage.world_archives import is_archive
 from storage.world_files import IMAGE_SUFFIXES, MAP_SUFFIXES, named_picture
 from storage.world_sources import (
     FOLDER_SUFFIXES,
+    Paths,
     Reading,
     natural_order,
     read_archive,
@@ -123,6 +124,7 @@ class _Search:
     passed_over: list[Path] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     cells: int = 0
+    paths: dict[Path, Paths] = field(default_factory=dict)
 
     def take(self, file: Path) -> None:
         """Read a file that must hold worlds."""
@@ -132,13 +134,13 @@ class _Search:
             self.passed_over += archive.passed_over
             self.refused += archive.refused
         else:
-            self._add(read_world_file(file, self.reading))
+            self._add(read_world_file(file, self.reading, known_paths=self.paths))
 
     def look_into(self, file: Path) -> None:
         """Read a file that lies in a folder."""
         require_resolution(file, self.reading)
         try:
-            worlds = read_world_file(file, self.reading)
+            worlds = read_world_file(file, self.reading, known_paths=self.paths)
         except NotAMapError:
             self.passed_over.append(file)
         except WorldError as error:

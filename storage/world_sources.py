@@ -66,8 +66,19 @@ class Archive:
     refused: tuple[str, ...]
 
 
-def read_world_file(file: Path, reading: Reading) -> list[World]:
+Paths = dict[int, IntArray]
+"""BARN's paths by their numbers."""
+
+
+def read_world_file(
+    file: Path, reading: Reading, *, known_paths: dict[Path, Paths] | None = None
+) -> list[World]:
     """Read the worlds of one file that is no archive.
+
+    Args:
+        file: File to read.
+        reading: What it leaves open.
+        known_paths: BARN's paths by folder, each read once by whoever keeps this for all files.
 
     Raises:
         NotAMapError: It holds something else.
@@ -87,7 +98,8 @@ def read_world_file(file: Path, reading: Reading) -> list[World]:
         return [read_array_world(file)]
     if suffix in _PACKABLE:
         world = _read_content(file, _bytes(file), reading)
-        return list(_with_courses([world], lambda: _paths_beside(file.parent), reading))
+        known = {} if known_paths is None else known_paths
+        return list(_with_courses([world], lambda: _paths_beside(file.parent, known), reading))
     raise NotAMapError(
         f"{file} is no map, expected a world set (worlds.parquet), yaml, an image, .world, "
         "an npz of `ses export`, a HouseExpo json, a BARN npy, a log (bag, db3, mcap), a mesh "
@@ -104,7 +116,7 @@ def read_archive(file: Path, reading: Reading) -> Archive:
     worlds: list[World] = []
     passed_over: list[Path] = []
     refused: list[str] = []
-    paths: dict[int, IntArray] = {}
+    paths: Paths = {}
     cells = 0
     for name, content in archived_files(file):
         if name.suffix.lower() not in _PACKABLE:
@@ -185,15 +197,17 @@ def _barn_path(name: Path, content: bytes) -> IntArray | None:
     return read_barn_array(name, content).path
 
 
-def _paths_beside(folder: Path) -> dict[int, IntArray]:
-    """Read BARN's paths by number, from a folder of worlds or its `path_files`."""
-    files = [*folder.glob("path_*.npy"), *(folder / _PATH_FOLDER).glob("path_*.npy")]
-    paths = ((file, _barn_path(file, _bytes(file))) for file in files)
-    return {_number(file.stem): path for file, path in paths if path is not None}
+def _paths_beside(folder: Path, known: dict[Path, Paths]) -> Paths:
+    """Read BARN's paths from a folder of worlds or its `path_files`, unless they are known."""
+    if folder not in known:
+        files = [*folder.glob("path_*.npy"), *(folder / _PATH_FOLDER).glob("path_*.npy")]
+        paths = ((file, _barn_path(file, _bytes(file))) for file in files)
+        known[folder] = {_number(file.stem): path for file, path in paths if path is not None}
+    return known[folder]
 
 
 def _with_courses(
-    worlds: Iterable[World], paths: Callable[[], dict[int, IntArray]], reading: Reading
+    worlds: Iterable[World], paths: Callable[[], Paths], reading: Reading
 ) -> Iterator[World]:
     """Give BARN's worlds the start and goal of their paths, where that is asked for."""
     if reading.barn_course == "protocol":

@@ -19,7 +19,8 @@ from ses_core.worlds.cellular_automata import (
     barn_course,
     generate_barn_world,
 )
-from storage import world_archives
+from storage import world_archives, world_sources
+from storage.barn_files import BarnArray, read_barn_array
 from storage.world_sets import find_worlds, read_worlds, write_world_set
 from storage.world_sources import Reading
 from tests.shared_data import shared_data
@@ -278,3 +279,21 @@ def test_streams_one_after_another_are_one_archive(tmp_path: Path, suffix: str) 
     path.write_bytes(packed[: len(packed) - len(streams[-1]) - 40])
     with pytest.raises(WorldError, match="cannot be read as an archive"):
         find_worlds([path])
+
+
+def test_paths_beside_worlds_are_read_once_a_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(5):
+        np.save(tmp_path / f"grid_{number}.npy", np.roll(FIELD, number, axis=1))
+        np.save(tmp_path / f"path_{number}.npy", PATH)
+    read: list[str] = []
+
+    def counted(path: Path, content: bytes) -> BarnArray:
+        read.append(path.name)
+        return read_barn_array(path, content)
+
+    monkeypatch.setattr(world_sources, "read_barn_array", counted)
+    assert len(find_worlds([tmp_path], reading=Reading(barn_course="path")).worlds) == 5
+    # Once as the paths of the folder, once as a file that may be a world.
+    assert read.count("path_3.npy") == 2
