@@ -131,13 +131,16 @@ def read_pixels(
     except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError) as error:
         raise WorldError(f"{path} cannot be read as an image: {first_line(error)}") from error
     if is_grey or is_deep:
-        lightness = pixels / np.float32(65535.0 if is_deep else 255.0)
+        lightness = np.divide(pixels, 65535.0 if is_deep else 255.0, dtype=np.float32)
         return lightness, np.broadcast_to(np.float32(1.0), pixels.shape)
     # Bytes until a pixel is one number: floats of every colour would take 16 bytes a pixel.
     light = pixels[..., 0].astype(np.uint16)
     light += pixels[..., 1]
     light += pixels[..., 2]
-    return light / np.float32(3 * 255.0), pixels[..., 3] / np.float32(255.0)
+    return (
+        np.divide(light, 3 * 255.0, dtype=np.float32),
+        np.divide(pixels[..., 3], 255.0, dtype=np.float32),
+    )
 
 
 def named_picture(path: Path) -> Path | None:

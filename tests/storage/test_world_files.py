@@ -214,7 +214,7 @@ def test_colours_are_read_within_a_few_bytes_a_pixel(tmp_path: Path) -> None:
     tracemalloc.stop()
     assert np.allclose(lightness, pixels[..., :3].mean(axis=2) / 255.0, atol=1e-6)
     assert np.allclose(opacity, pixels[..., 3] / 255.0)
-    assert (lightness.dtype, opacity.dtype) == (np.float32, np.float32)
+    assert lightness.dtype == opacity.dtype == np.dtype(np.float32)
     assert peak < 20 * lightness.size
 
 
