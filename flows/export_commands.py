@@ -88,6 +88,8 @@ def export(
             "found --worlds too, expected one place to look the id up in",
             param_hint="--environments",
         )
+    if not worlds:
+        _refuse_lone(part=part, resolution=resolution)
     if worlds:
         if course:
             raise typer.BadParameter(
@@ -101,6 +103,15 @@ def export(
     else:
         _export_stored(command, identity, path, export_format, course=course)
     command.answer({"path": str(path)}, lambda: str(path))
+
+
+def _refuse_lone(*, part: str | None, resolution: float | None) -> None:
+    """Refuse options that say how worlds are read where there are none."""
+    for option, value in (("--part", part), ("--resolution", resolution)):
+        if value is not None:
+            raise typer.BadParameter(
+                f"found {value} without --worlds, expected worlds to read by it", param_hint=option
+            )
 
 
 def _target(out: Path, export_format: ExportFormat) -> Path:
@@ -161,7 +172,7 @@ def _export_stored(
 ) -> None:
     """Export what the store holds under an id."""
     layout = command.existing_store()
-    table, row = find_row(layout, identity)
+    table, row = find_row(layout, identity, expected="the id of a scenario or an environment")
     if table == "logs":
         raise typer.BadParameter(
             f"found {identity!r}, a log, expected a scenario or an environment (`ses scenarios` "

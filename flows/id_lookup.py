@@ -22,8 +22,18 @@ TABLES: Mapping[str, str] = {
 _LISTED = 3
 
 
-def find_row(layout: "Layout", identity: str) -> tuple[str, dict[str, JsonValue]]:
+def find_row(
+    layout: "Layout",
+    identity: str,
+    *,
+    expected: str = "the id of a scenario, an environment or a log",
+) -> tuple[str, dict[str, JsonValue]]:
     """Find the table and the row that an id names.
+
+    Args:
+        layout: The store to look through.
+        identity: The id, or its beginning.
+        expected: What whoever asks can use, for the refusal of an id that nothing has.
 
     Raises:
         typer.BadParameter: Nothing, or more than one thing, has this id.
@@ -35,7 +45,7 @@ def find_row(layout: "Layout", identity: str) -> tuple[str, dict[str, JsonValue]
         for table, column in TABLES.items()
         for found in open_table(layout.root, table, columns=[column])[column]
     }
-    whole = pick_id(identity, list(known), expected="the id of a scenario, an environment or a log")
+    whole = pick_id(identity, list(known), expected=expected)
     table = known[whole]
     rows = open_table(layout.root, table)
     return table, _plain(rows[rows[TABLES[table]] == whole].iloc[0])

@@ -132,7 +132,11 @@ def test_misuse_says_in_one_line_what_was_found_and_expected(
     identity = scenario["scenario_id"]
     stored = ("--root", str(root), "--format")
     out = ("--out", str(tmp_path / "x"))
-    assert "expected the id of a scenario" in refusal(capfd, "zzz", *stored, "png", *out)
+    unknown = refusal(capfd, "zzz", *stored, "png", *out)
+    assert "expected the id of a scenario or an environment, or its beginning" in unknown
+    for option, value in (("--part", "fit"), ("--resolution", "0.1")):
+        lone = refusal(capfd, identity, *stored, "png", *out, option, value)
+        assert f"{option}: found {value} without --worlds, expected" in lone
     assert "found ''" in refusal(capfd, "", *stored, "png", *out)
     assert "a log" in refusal(capfd, scenario["log_id"], *stored, "png", *out)
     assert "'map-server'" in refusal(capfd, identity, *stored, "gif", *out)
