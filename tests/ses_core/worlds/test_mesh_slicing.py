@@ -84,10 +84,12 @@ def test_walls_without_a_floor_stand_on_the_ground_around_them() -> None:
 @pytest.mark.parametrize("height", [0.0, 2.6, 77.7])
 def test_a_slice_from_the_floor_itself_has_ground(height: float) -> None:
     raised = np.array((0, 0, height), dtype=np.float32)
-    chest = box((1, 1, 0), (2, 2, 0.05))
-    cells = _slice(GROUND + raised, chest + raised, low=0.0).cells
-    assert np.count_nonzero(cells) == 100
-    assert cells.shape == (40, 40)
+    chest = box((1, 1, 0), (2, 2, 0.6))
+    post = box((4.5, 0, 0), (5, 4, 1))
+    cells = _slice(GROUND + raised, chest + raised, post + raised, low=0.0).cells
+    # The ground goes as far as the floor does: to what is cut off beyond it, one cell is kept.
+    assert cells.shape == (40, 41)
+    assert np.count_nonzero(cells) == 100 + 40
 
 
 def test_faces_wound_the_other_way_are_floor_too() -> None:
