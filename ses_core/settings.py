@@ -7,6 +7,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from ses_core.fleet_settings import FleetSettings
 from ses_core.imperfections import Imperfections, PresetName
 from ses_core.robot_profile import JACKAL, KNOWN_PROFILES, RobotProfile
+from ses_core.scorecard_settings import ScorecardSettings
 from ses_core.settings_model import SettingsModel
 
 
@@ -290,6 +291,7 @@ class Settings(SettingsModel):
     training: TrainingSettings = TrainingSettings()
     evaluation: EvaluationSettings = EvaluationSettings()
     fleet: FleetSettings = FleetSettings()
+    scorecard: ScorecardSettings = ScorecardSettings()
     store: StoreSettings = StoreSettings()
     target_robot: RobotProfile = Field(
         JACKAL, description="The robot that is trained: a profile, or the name of one."

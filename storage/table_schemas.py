@@ -133,6 +133,16 @@ _REQUIRED: Final[dict[str, dict[str, pa.DataType]]] = {
         "created_stamp_ns": _WHOLE,
         "decision": _TEXT,
     },
+    "scorecard": {
+        "metric": _TEXT,
+        "feature": _TEXT,
+        "unit": _TEXT,
+        "aim": _TEXT,
+        "n_real": _WHOLE,
+        "n_synthesized": _WHOLE,
+        "halves": _TEXT,
+        "note": _TEXT,
+    },
 }
 
 _NULLABLE: Final[dict[str, dict[str, pa.DataType]]] = {
@@ -189,10 +199,23 @@ _NULLABLE: Final[dict[str, dict[str, pa.DataType]]] = {
         "goal_y_m": _REAL,
     },
     "policies": {"parent_id": _TEXT, "success_rate": _REAL, "mean_time_s": _REAL},
+    "scorecard": {
+        "value": _REAL,
+        "low": _REAL,
+        "high": _REAL,
+        "real_value": _REAL,
+        "real_low": _REAL,
+        "real_high": _REAL,
+        "p_value": _REAL,
+        "real_p_value": _REAL,
+    },
 }
 
-TABLES: Final = tuple(_REQUIRED)
-"""Names of all tables."""
+FILE_TABLES: Final = frozenset({"scorecard"})
+"""Tables that a command writes into a folder of its caller's, and no store keeps."""
+
+TABLES: Final = tuple(table for table in _REQUIRED if table not in FILE_TABLES)
+"""Names of all tables of a store."""
 
 _PANDAS_TYPES: Final = {_WHOLE: ("int64", "Int64"), _TRUTH: ("bool", "boolean")}
 

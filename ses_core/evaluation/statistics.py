@@ -64,17 +64,23 @@ def restricted_time(episode: Episode) -> float:
 
 
 def ratio_interval(
-    numerators: FloatArray, denominators: FloatArray, clusters: Sequence[str], *, seed: int
+    numerators: FloatArray,
+    denominators: FloatArray,
+    clusters: Sequence[str],
+    *,
+    seed: int,
+    resamples: int = _RESAMPLES,
 ) -> Interval | None:
     """Give the 95 % percentile interval of sum(numerators) / sum(denominators).
 
-    Whole clusters are drawn with replacement, 10,000 times.
+    Whole clusters are drawn with replacement.
 
     Args:
         numerators: (E,) one per episode.
         denominators: (E,) one per episode; zeros leave an episode out.
         clusters: The world of each episode (E,).
         seed: Seed of the draws: equal input, equal interval.
+        resamples: Number of draws.
 
     Returns:
         None with fewer than two clusters, or where a draw can have nothing to divide by.
@@ -89,18 +95,20 @@ def ratio_interval(
     if len(below) < 2:
         return None
     rng = np.random.default_rng(seed)
-    draws = rng.multinomial(len(below), np.full(len(below), 1 / len(below)), size=_RESAMPLES)
+    draws = rng.multinomial(len(below), np.full(len(below), 1 / len(below)), size=resamples)
     low, high = np.quantile((draws @ above) / (draws @ below), (0.025, 0.975))
     return float(low), float(high)
 
 
-def rate_interval(hits: FloatArray, clusters: Sequence[str], *, seed: int) -> Interval | None:
+def rate_interval(
+    hits: FloatArray, clusters: Sequence[str], *, seed: int, resamples: int = _RESAMPLES
+) -> Interval | None:
     """Give the 95 % interval of a share of episodes.
 
     Where every episode went the same way, resampling says nothing: Wilson's interval with the
     number of worlds for a sample size stands in.
     """
-    interval = ratio_interval(hits, np.ones(len(hits)), clusters, seed=seed)
+    interval = ratio_interval(hits, np.ones(len(hits)), clusters, seed=seed, resamples=resamples)
     share = float(hits.mean())
     if interval is None or 0.0 < share < 1.0:
         return interval

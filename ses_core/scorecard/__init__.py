@@ -1,0 +1,1 @@
+"""How representative synthesized environments are, each number beside its real-against-real one."""

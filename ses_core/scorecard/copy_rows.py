@@ -1,0 +1,137 @@
+"""Rows about copies: near duplicates within a sample, and copies of what was learned from."""
+
+import numpy as np
+from numpy.random import Generator
+
+from ses_core.arrays import BoolArray
+from ses_core.occupancy import ENVIRONMENT_CELLS
+from ses_core.scorecard.copies import (
+    Memorisation,
+    memorisation,
+    near_duplicate_share,
+    nearest_of_other_groups,
+    nearest_training,
+)
+from ses_core.scorecard.distances import (
+    differing_cells,
+    differing_cells_or_mirrored,
+)
+from ses_core.scorecard.halving import Grouping
+from ses_core.scorecard.rows import Halved, ScorecardRow, halved_row, level_row
+from ses_core.scorecard.sampled import Sampled
+from ses_core.scorecard_settings import ScorecardSettings
+
+_AREA = ENVIRONMENT_CELLS**2
+
+
+def copy_rows(
+    real: BoolArray,
+    synthesized: BoolArray,
+    grouping: Grouping,
+    sampled: Sampled,
+    *,
+    settings: ScorecardSettings,
+    rng: Generator,
+) -> list[ScorecardRow]:
+    """Look for copies, as they are and mirrored too."""
+    rows = []
+    for mirrored_too in (False, True):
+        rows.append(_duplicate_row(sampled, mirrored_too, settings))
+        rows.append(_copy_row(real, synthesized, grouping, mirrored_too, settings))
+        rows.append(_memorisation_row(real, synthesized, grouping, mirrored_too, rng))
+    return rows
+
+
+def _named(mirrored_too: bool) -> str:
+    return "cells (Hamming), mirrored too" if mirrored_too else "cells (Hamming)"
+
+
+def _duplicate_row(
+    sampled: Sampled,
+    mirrored_too: bool,
+    settings: ScorecardSettings,
+) -> ScorecardRow:
+    measure = differing_cells_or_mirrored if mirrored_too else differing_cells
+    apart = measure(sampled.maps.cells, sampled.maps.cells)
+    most = settings.copy_share * _AREA
+    return halved_row(
+        "near duplicates",
+        f"{_named(mirrored_too)}, at most {most:g} cells from another of the sample",
+        "share",
+        "low",
+        Halved(
+            values=[
+                near_duplicate_share(apart, sampled.maps.index[one.synthesized], cells=most)
+                for one in sampled.splits
+            ],
+            real_values=[
+                near_duplicate_share(apart, sampled.maps.index[one.heldout], cells=most)
+                for one in sampled.splits
+            ],
+            size=sampled.size,
+        ),
+        halves=sampled.grouping.named(),
+        note=sampled.shortage(),
+    )
+
+
+def _copy_row(
+    real: BoolArray,
+    synthesized: BoolArray,
+    grouping: Grouping,
+    mirrored_too: bool,
+    settings: ScorecardSettings,
+) -> ScorecardRow:
+    most = settings.copy_share * _AREA
+    ours = nearest_training(synthesized, real, mirrored_too=mirrored_too)
+    theirs = nearest_of_other_groups(real, grouping, mirrored_too=mirrored_too)
+    return level_row(
+        "copies",
+        f"{_named(mirrored_too)}, at most {most:g} cells from a real one "
+        "(real ones: from one of another group)",
+        "share",
+        "low",
+        np.where(np.isfinite(ours), ours <= most, np.nan),
+        np.where(np.isfinite(theirs), theirs <= most, np.nan),
+        real_groups=[str(label) for label in grouping.labels],
+        halves=grouping.named(),
+        seed=settings.seed,
+    )
+
+
+def _memorisation_row(
+    real: BoolArray,
+    synthesized: BoolArray,
+    grouping: Grouping,
+    mirrored_too: bool,
+    rng: Generator,
+) -> ScorecardRow:
+    found: Memorisation | None = None
+    if grouping.count > 1 and len(synthesized) > 0:
+        found = memorisation(synthesized, real, grouping, mirrored_too=mirrored_too, rng=rng)
+        middle = np.median(found.synthesized), np.median(found.real)
+        note = (
+            f"median to the nearest real one of other groups: {middle[0]:.4g} cells, "
+            f"of real ones {middle[1]:.4g} cells"
+        )
+    else:
+        note = (
+            f"too few: n={len(synthesized)} synthesized and {grouping.count} groups of real "
+            "ones, expected 1 and 2"
+        )
+    return ScorecardRow(
+        metric="memorisation",
+        feature=f"{_named(mirrored_too)}, chance to be nearer to a real one than a real one is; "
+        "Mann-Whitney, one-sided",
+        unit="chance",
+        aim="as real",
+        value=found.nearer if found else None,
+        low=found.interval[0] if found else None,
+        high=found.interval[1] if found else None,
+        real_value=0.5 if found else None,
+        p_value=found.p_value if found else None,
+        n_real=len(real),
+        n_synthesized=len(synthesized),
+        halves=grouping.named(),
+        note=note,
+    )
