@@ -33,9 +33,9 @@ _UNREADABLE = (
     zipfile.BadZipFile,
     zlib.error,
     lzma.LZMAError,
-    # Of an encrypted entry, and its subclass NotImplementedError of an unknown compression.
+    # Raised for an encrypted entry; for an unknown compression, its subclass NotImplementedError.
     RuntimeError,
-    # Of a header that claims more than there is.
+    # Raised for a header that claims more than there is.
     MemoryError,
 )
 

@@ -1,6 +1,8 @@
 """From a night's artifacts to everything its page shows."""
 
 import json
+from collections.abc import Hashable, Mapping
+from typing import Any
 
 import pandas as pd
 
@@ -14,7 +16,7 @@ from ses_core.extraction.funnel import (
 )
 from ses_core.extraction.holdout import Holdout
 from ses_core.extraction.selection import COUNT_COLUMNS
-from ses_core.navigation import NavigationDomain
+from ses_core.navigation import NavigationDomain, NavigationEnvironment
 from storage.artifact_store import LocalArtifactStore
 from storage.environment_files import read_environments
 from storage.evaluation_files import read_episodes
@@ -171,16 +173,7 @@ def _recorded(
     if selection is None:
         return ()
     chosen = tuple(
-        ShownEnvironment(
-            environment_id=one.environment_id,
-            cells=one.cells,
-            observed=one.observed,
-            origin=one.origin,
-            scenario_id=row["scenario_id"],
-            site=row["site"],
-            robot=row["robot"],
-            count=row["count"],
-        )
+        _shown(one, row, count=row["count"])
         for one, row in zip(
             selection.pool_environments.environments,
             selection.pool.to_dict("records"),
@@ -200,19 +193,37 @@ def _recorded(
     ).assign(count=lambda rows: rows[COUNT_COLUMNS[night.settings.filter.count_kind]])
     rest = rest.sort_values(["count", "scenario_id"], ascending=[False, True])
     return chosen + tuple(
-        ShownEnvironment(
-            environment_id=one.environment_id,
-            cells=one.cells,
-            observed=one.observed,
-            origin=one.origin,
-            scenario_id=row["scenario_id"],
-            site=row["site"],
-            robot=row["robot"],
+        _shown(
+            one,
+            row,
             count=None if pd.isna(row["count"]) else float(row["count"]),
             is_traversable=row["is_traversable"],
             is_chosen=False,
         )
         for one, row in zip(environments_of(rest), rest.to_dict("records"), strict=True)
+    )
+
+
+def _shown(
+    environment: NavigationEnvironment,
+    row: Mapping[Hashable, Any],
+    *,
+    count: float | None,
+    is_traversable: bool = True,
+    is_chosen: bool = True,
+) -> ShownEnvironment:
+    """Show an environment with the scenario, site and robot of its row."""
+    return ShownEnvironment(
+        environment_id=environment.environment_id,
+        cells=environment.cells,
+        observed=environment.observed,
+        origin=environment.origin,
+        scenario_id=row["scenario_id"],
+        site=row["site"],
+        robot=row["robot"],
+        count=count,
+        is_traversable=is_traversable,
+        is_chosen=is_chosen,
     )
 
 

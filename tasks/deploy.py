@@ -75,18 +75,20 @@ def fleet_tasks(
             world, number, profile=profile, min_distance=min_distance, preset=preset, rng=rng
         )
 
-    usable = [world for world in worlds if pairs(world, 1)]
+    drawn = [pairs(world, -(-count // len(worlds))) for world in worlds]
+    usable = [world for world, tasks in zip(worlds, drawn, strict=True) if tasks]
     if not usable:
         raise WorldError(
             f"none of {len(worlds)} worlds has two places {min_distance:g} m apart, expected one"
         )
+    if len(usable) < len(worlds):
+        drawn = [pairs(world, -(-count // len(usable))) for world in usable]
     share, more = divmod(count, len(usable))
     # A robot's drives are written together: what waits for its log stays in memory.
     return [
         task
-        for place, world in enumerate(usable)
-        if (number := share + (place < more))
-        for task in islice(cycle(pairs(world, number)), number)
+        for place, tasks in enumerate(drawn)
+        for task in islice(cycle(tasks), share + (place < more))
     ]
 
 

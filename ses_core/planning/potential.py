@@ -64,7 +64,7 @@ def spread_potential(
     Each cell interpolates between its two lowest neighbours, as in NavFn. But cells are worked
     off in order of potential plus straight way to the robot, a sixteenth of a free cell at a time:
     NavFn's three waves pass over the same cells again and again. And only what the last search
-    has reached is forgotten: a house has half a million cells, most of them far from memory.
+    has reached is forgotten: a house has half a million cells, most of them in no cache.
     """
     width, height = slot.map_width, slot.map_height
     potential = memory.potential[slot.map_offset : slot.map_offset + width * height]
