@@ -15,20 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader
 
-from flows.fleet_deployment import deploy
 from ses_core.fleet_settings import FleetSettings
-from ses_core.robot_profile import GENERIC
-from ses_core.settings import DecoderLimits, EvaluationSettings, Settings
+from ses_core.learning.policies import FIXED_POLICIES
+from ses_core.robot_profile import GENERIC, JACKAL
+from ses_core.settings import DecoderLimits, Settings, SimulationSettings
+from ses_core.worlds.deployment import Deployment, deploy
 from ses_core.worlds.homes import generate_homes
+from ses_core.worlds.pairs import MIN_DISTANCE_M
 from storage.collected_streams import CollectedStreams
+from storage.deployment_logs import FleetFormat, write_deployments
 from storage.log_decoder import decode_log
 from storage.log_formats import ROSBAG1, ROSBAG2_MCAP, ROSBAG2_SQLITE, make_reader
 from storage.rosbag_containers import open_recording
 from storage.rosbag_logs import collect_streams
 from storage.topic_choice import choose_topics
-from storage.world_sets import write_world_set
+from tasks.deploy import fleet_tasks
 
-FORMATS = {"mcap": ROSBAG2_MCAP, "bag": ROSBAG1, "db3": ROSBAG2_SQLITE}
+FORMATS: dict[FleetFormat, str] = {
+    "mcap": ROSBAG2_MCAP,
+    "bag": ROSBAG1,
+    "db3": ROSBAG2_SQLITE,
+}
 TOPICS = ("/scan", "/odom", "/cmd_vel")
 ROUNDS = 5
 MESSAGES = 100_000
@@ -44,14 +51,13 @@ def measure(
     deployments: int = DEPLOYMENTS,
     least: int = MESSAGES,
     rounds: int = ROUNDS,
-    formats: Sequence[str] = tuple(FORMATS),
+    formats: Sequence[FleetFormat] = tuple(FORMATS),
 ) -> list[dict[str, str | float]]:
     """Decode one robot's day in every format, both ways by turns; rates are of the best rounds."""
-    homes = scratch / "homes"
-    write_world_set(homes, generate_homes(1, seed=3))
+    day = _drive_day(deployments)
     rows = []
     for name in formats:
-        bag = _write_day(scratch, homes, name, deployments)
+        bag = _write_day(scratch / f"day-{name}", day, name)
         folder = scratch / f"inflated-{name}"
         folder.mkdir()
         count = _require_equal(bag, folder)
@@ -67,18 +73,37 @@ def measure(
     return rows
 
 
-def _write_day(scratch: Path, homes: Path, name: str, deployments: int) -> Path:
-    """Let one robot drive all day, all of it in one log."""
-    out = scratch / f"day-{name}"
-    fleet = FleetSettings(robots_per_site=1, drives_per_log=deployments)
-    deploy(
-        root=scratch / "store",
-        worlds=(homes,),
-        out=out,
-        deployments=deployments,
-        format=name,  # type: ignore[arg-type]  # one of them
-        date=date(2026, 1, 2),
-        settings=Settings(fleet=fleet, evaluation=EvaluationSettings(pair_preset="long")),
+def _drive_day(deployments: int) -> list[Deployment]:
+    """Let one robot drive all day."""
+    tasks = fleet_tasks(
+        generate_homes(1, seed=3),
+        deployments,
+        min_distance=MIN_DISTANCE_M,
+        preset="long",
+        profile=JACKAL,
+        seed=0,
+    )
+    driven = deploy(
+        tasks,
+        FIXED_POLICIES["dwa-slow"],
+        seed=0,
+        simulation=SimulationSettings(),
+        profile=JACKAL,
+    )
+    return list(driven)
+
+
+def _write_day(out: Path, day: Sequence[Deployment], name: FleetFormat) -> Path:
+    """Write all of a day into one log."""
+    fleet = FleetSettings(robots_per_site=1, drives_per_log=len(day))
+    tasks = [deployment.task for deployment in sorted(day, key=lambda each: each.number)]
+    write_deployments(
+        out,
+        iter(day),
+        tasks=tasks,
+        format=name,
+        day=date(2026, 1, 2),
+        settings=Settings(fleet=fleet),
     )
     (done,) = out.rglob("*.done")
     return done.with_suffix("")

@@ -69,7 +69,9 @@ def synthesize(
         ).result()
         folder = night.store.path(made.ref)
     out.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(folder / ENVIRONMENTS_FILE, out / ENVIRONMENTS_FILE)
+    # The record goes along: the scorecard wants to know how many samples could not be crossed.
+    for name in (SYNTHESIS_FILE, ENVIRONMENTS_FILE):
+        shutil.copyfile(folder / name, out / name)
     used = read_record(folder / SYNTHESIS_FILE, SynthesisUse)
     return SynthesisSummary(
         environments=len(read_environments(out).environments),

@@ -13,7 +13,7 @@ from flows.command_line import run
 from ses_core.arrays import BoolArray
 from ses_core.robot_profile import JACKAL
 from storage.environment_files import ENVIRONMENTS_FILE, write_environments
-from storage.scorecard_files import read_scorecard, row_record
+from storage.scorecard_files import raw_traversable_share, read_scorecard, row_record
 from tests.ses_core.scorecard.samples import pillars, score
 from tests.ses_core.synthesis.places import domain_of
 
@@ -71,6 +71,22 @@ def test_rows_are_answered_and_written_with_a_picture(folder: Path, tmp_path: Pa
     assert by_metric["mean time"]["n_real"] == 6
     assert by_metric["coverage"]["halves"] == "by environment (24)"
     assert Image.open(tmp_path / "out" / "scorecard.png").size[0] > 1000
+
+
+def test_what_was_synthesized_brings_the_share_of_all_draws(folder: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "flows.command_line", "synthesize", "--json"),
+            *("--method", "rs", "--count", "6", "--from", str(folder / "real")),
+            *("--root", str(tmp_path / "store"), "--out", str(tmp_path / "made")),
+        ],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert answer["environments"] == 6
+    assert raw_traversable_share(tmp_path / "made") == 1.0 - answer["rejected_share"]
 
 
 def test_people_read_one_line_for_each_row(
