@@ -10,13 +10,12 @@ from flows.nightly_batch import nightly
 from ses_core.settings import (
     EvaluationSettings,
     FilterSettings,
-    GanSettings,
     IngestSettings,
     RobotRule,
     Settings,
-    SynthesisSettings,
     TrainingSettings,
 )
+from ses_core.synthesis_settings import GanSettings, SynthesisSettings
 from storage.artifact_store import LocalArtifactStore
 from tasks.deploy import DemonstrationFleet, deploy_demonstration
 

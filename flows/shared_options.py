@@ -8,7 +8,17 @@ import typer
 from flows.command_arguments import existing_directory, existing_path
 
 SimulatorName = Literal["batch", "bullet"]
-SynthesizerName = Literal["gan", "pca", "rs", "identity"]
+SynthesizerName = Literal[
+    "gan",
+    "gan-paper",
+    "pca",
+    "pca-paper",
+    "rs",
+    "medoids",
+    "identity",
+    "mirror",
+    "autoregressive",
+]
 CountKind = Literal["negative", "not-forward", "reversing-seconds"]
 
 InboxOption = Annotated[

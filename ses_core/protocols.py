@@ -51,8 +51,17 @@ class Synthesizer(Protocol):
         *,
         rng: Generator,
         progress: Callable[[float], None],
+        start: FittedSynthesizer | None = None,
     ) -> FittedSynthesizer:
-        """Fit to a domain, hardest environment first; `progress` hears shares from 0 to 1."""
+        """Fit to a domain, hardest environment first.
+
+        Args:
+            domain: What to learn from.
+            rng: Source of chance.
+            progress: Hears the share that is done, from 0 to 1.
+            start: Earlier fit of the same method to go on from (a warm start); methods whose
+                fit has no beginning pay it no heed.
+        """
         ...
 
 

@@ -1,6 +1,6 @@
 """Every setting of a night, one frozen model per stage; defaults are the paper's numbers."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -9,6 +9,7 @@ from ses_core.imperfections import Imperfections, PresetName
 from ses_core.robot_profile import JACKAL, KNOWN_PROFILES, RobotProfile
 from ses_core.scorecard_settings import ScorecardSettings
 from ses_core.settings_model import SettingsModel
+from ses_core.synthesis_settings import SynthesisSettings
 
 
 class RobotRule(SettingsModel):
@@ -125,72 +126,6 @@ class FilterSettings(SettingsModel):
     max_contradicted_fraction: float = Field(
         0.5, ge=0, le=1, description="Most beam ends that other beams saw through (lost poses)."
     )
-
-
-class GanSettings(SettingsModel):
-    """SES-GAN: the paper's layers; what it leaves open is a setting here."""
-
-    method: Literal["gan"] = "gan"
-    latent_size: int = Field(64, ge=1, description="Length of the noise vector.")
-    epochs: int = Field(200, ge=1, description="Passes over the challenging environments.")
-    batch_size: int = Field(64, ge=2, description="Environments per update.")
-    learning_rate: float = Field(2e-4, gt=0, description="Of both Adam optimisers.")
-    adam_beta1: float = Field(0.5, ge=0, lt=1, description="First-moment decay of both optimisers.")
-    leaky_slope: float = Field(0.2, gt=0, lt=1, description="Negative slope of the leaky ReLUs.")
-    loss: Literal["saturating", "non-saturating"] = Field(
-        "non-saturating",
-        description="The generator minimises -log D(G(z)), or log(1 - D(G(z))) as printed, which "
-        "teaches it nothing once D is ahead.",
-    )
-    least_updates: int = Field(
-        2000, ge=1, description="Updates made even where the epochs would make fewer."
-    )
-    least_environments: int = Field(
-        30, ge=2, description="With fewer to learn from, the recorded places are copied instead."
-    )
-
-
-class PcaSettings(SettingsModel):
-    """SES-PCA: principal components, then K-means in their space."""
-
-    method: Literal["pca"] = "pca"
-    components: int = Field(100, ge=1, description="Principal components (section IV-B).")
-    per_cluster: int = Field(5, ge=1, description="n: environments drawn from each cluster.")
-
-
-class RandomSamplingSettings(SettingsModel):
-    """SES-RS: draw from the challenging environments uniformly."""
-
-    method: Literal["rs"] = "rs"
-
-
-class IdentitySettings(SettingsModel):
-    """Copies of the recorded places, as in the paper's physical experiment, hardest first."""
-
-    method: Literal["identity"] = "identity"
-
-
-SynthesizerSettings = Annotated[
-    GanSettings | PcaSettings | RandomSamplingSettings | IdentitySettings,
-    Field(discriminator="method"),
-]
-
-
-class SynthesisSettings(SettingsModel):
-    """From thousands of challenging environments to about a hundred (section III-C)."""
-
-    synthesizer: SynthesizerSettings = Field(GanSettings(), description="How they are made.")
-    environments: int = Field(100, ge=1, description="M: environments to train in.")
-    least_pool: int = Field(
-        10,
-        ge=1,
-        description="With fewer challenging environments a night trains nothing: that would "
-        "teach those few places by heart.",
-    )
-    attempts: int = Field(
-        20, ge=1, description="Most samples drawn per environment that can be crossed."
-    )
-    seed: int = Field(0, ge=0, description="Seed of the fit and of the samples.")
 
 
 class SimulationSettings(SettingsModel):

@@ -10,10 +10,10 @@ from pydantic import TypeAdapter
 
 from ses_core.errors import ArtifactError, SynthesisError
 from ses_core.recipes import JsonValue, canonical_json, settings_json
-from ses_core.settings import SynthesizerSettings
 from ses_core.synthesis.factory import rebuild_synthesizer
 from ses_core.synthesis.sizes import SynthesisPlan
 from ses_core.synthesis.synthesize import FittedSynthesis
+from ses_core.synthesis_settings import SynthesizerSettings
 
 ARRAYS_FILE = "synthesizer.npz"
 PLAN_FILE = "plan.json"

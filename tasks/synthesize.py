@@ -10,8 +10,8 @@ from prefect.cache_policies import NO_CACHE
 
 from ses_core.recipes import ArtifactRef, Recipe, settings_json
 from ses_core.robot_profile import RobotProfile
-from ses_core.settings import SynthesisSettings
 from ses_core.synthesis.synthesize import draw_environments, fit_synthesis
+from ses_core.synthesis_settings import SynthesisSettings
 from storage.artifact_store import LocalArtifactStore
 from storage.environment_files import (
     ENVIRONMENTS_FILE,

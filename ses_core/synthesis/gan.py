@@ -24,8 +24,8 @@ from torch.nn import functional
 from ses_core.arrays import Float32Array
 from ses_core.navigation import NavigationDomain
 from ses_core.occupancy import ENVIRONMENT_CELLS
-from ses_core.settings import GanSettings
 from ses_core.synthesis.generator_network import GeneratorNetwork, HiddenLayer
+from ses_core.synthesis_settings import GanSettings
 
 PIXELS = ENVIRONMENT_CELLS**2
 GENERATOR_LAYERS = (256, 512, 1024)

@@ -18,7 +18,7 @@ experiment. What was done stands in the plan, its notes reach the report.
 from dataclasses import dataclass
 
 from ses_core.errors import SynthesisError
-from ses_core.settings import (
+from ses_core.synthesis_settings import (
     GanSettings,
     IdentitySettings,
     PcaSettings,

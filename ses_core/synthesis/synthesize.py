@@ -11,10 +11,10 @@ from ses_core.navigation import NavigationDomain, NavigationEnvironment
 from ses_core.protocols import FittedSynthesizer
 from ses_core.recipes import digest_json
 from ses_core.robot_profile import RobotProfile
-from ses_core.settings import SynthesisSettings
 from ses_core.synthesis.factory import make_synthesizer
 from ses_core.synthesis.sizes import SynthesisPlan, plan_synthesis
 from ses_core.synthesis.traversability import traversable
+from ses_core.synthesis_settings import SynthesisSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

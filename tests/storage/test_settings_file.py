@@ -4,7 +4,8 @@ import pytest
 
 from ses_core.errors import SettingsError
 from ses_core.robot_profile import TURTLEBOT4
-from ses_core.settings import PcaSettings, Settings
+from ses_core.settings import Settings
+from ses_core.synthesis_settings import PcaSettings
 from storage.settings_file import parse_settings, read_settings
 
 

@@ -6,7 +6,8 @@ from numpy.random import default_rng
 
 from ses_core.errors import ArtifactError
 from ses_core.robot_profile import JACKAL
-from ses_core.settings import (
+from ses_core.synthesis.synthesize import FittedSynthesis, draw_environments, fit_synthesis
+from ses_core.synthesis_settings import (
     GanSettings,
     IdentitySettings,
     PcaSettings,
@@ -14,7 +15,6 @@ from ses_core.settings import (
     SynthesisSettings,
     SynthesizerSettings,
 )
-from ses_core.synthesis.synthesize import FittedSynthesis, draw_environments, fit_synthesis
 from storage.synthesizer_files import ARRAYS_FILE, PLAN_FILE, read_synthesizer, write_synthesizer
 from tests.ses_core.synthesis.places import domain_of, rooms
 

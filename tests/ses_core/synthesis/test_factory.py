@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from ses_core.errors import SynthesisError
-from ses_core.settings import (
+from ses_core.synthesis.factory import make_synthesizer, rebuild_synthesizer
+from ses_core.synthesis_settings import (
     GanSettings,
     IdentitySettings,
     PcaSettings,
     RandomSamplingSettings,
     SynthesizerSettings,
 )
-from ses_core.synthesis.factory import make_synthesizer, rebuild_synthesizer
 from tests.contracts.synthesizer import check_synthesizer
 from tests.ses_core.synthesis.places import domain_of, rooms
 

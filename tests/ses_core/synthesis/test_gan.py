@@ -2,7 +2,6 @@ import numpy as np
 import torch
 from numpy.random import default_rng
 
-from ses_core.settings import GanSettings
 from ses_core.synthesis.gan import (
     Gan,
     as_network,
@@ -12,6 +11,7 @@ from ses_core.synthesis.gan import (
     generator_loss,
 )
 from ses_core.synthesis.generator_network import SAMPLES_AT_ONCE
+from ses_core.synthesis_settings import GanSettings
 from tests.ses_core.synthesis.places import domain_of, rooms
 
 SETTINGS = GanSettings()

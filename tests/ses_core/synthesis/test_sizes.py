@@ -1,7 +1,8 @@
 import pytest
 
 from ses_core.errors import SynthesisError
-from ses_core.settings import (
+from ses_core.synthesis.sizes import plan_synthesis
+from ses_core.synthesis_settings import (
     GanSettings,
     IdentitySettings,
     PcaSettings,
@@ -9,7 +10,6 @@ from ses_core.settings import (
     SynthesisSettings,
     SynthesizerSettings,
 )
-from ses_core.synthesis.sizes import plan_synthesis
 
 ALL = (GanSettings(), PcaSettings(), RandomSamplingSettings(), IdentitySettings())
 

@@ -8,7 +8,9 @@ from numpy.random import default_rng
 from ses_core.arrays import BoolArray
 from ses_core.errors import SynthesisError
 from ses_core.robot_profile import JACKAL, RASPIMOUSE
-from ses_core.settings import (
+from ses_core.synthesis.synthesize import SynthesisResult, synthesize
+from ses_core.synthesis.traversability import traversable
+from ses_core.synthesis_settings import (
     GanSettings,
     IdentitySettings,
     PcaSettings,
@@ -16,8 +18,6 @@ from ses_core.settings import (
     SynthesisSettings,
     SynthesizerSettings,
 )
-from ses_core.synthesis.synthesize import SynthesisResult, synthesize
-from ses_core.synthesis.traversability import traversable
 from tests.ses_core.synthesis.places import domain_of, rooms, walled_off
 
 COPIERS: tuple[SynthesizerSettings, ...] = (RandomSamplingSettings(), IdentitySettings())
