@@ -103,7 +103,31 @@ class AutoregressiveSettings(SettingsModel):
     """Cell by cell from start to goal, each by a network that sees the cells before it."""
 
     method: Literal["autoregressive"] = "autoregressive"
-    epochs: int = Field(40, ge=1, description="Passes over the challenging environments, at most.")
+    reach: int = Field(
+        10, ge=1, le=29, description="Rows before a cell, and columns beside it, that it depends on."
+    )
+    hidden: int = Field(192, ge=8, description="Units of both hidden layers.")
+    updates: int = Field(6000, ge=1, description="Steps of the optimiser.")
+    batch_size: int = Field(2048, ge=32, description="Cells per update.")
+    learning_rate: float = Field(3e-3, gt=0, description="Of Adam at its highest.")
+    weight_decay: float = Field(1e-3, ge=0, description="Per unit of the learning rate.")
+    plain_share: float = Field(
+        0.25,
+        gt=0,
+        lt=1,
+        description="Share of a batch for cells that are like those before them; what they count "
+        "for makes up for it.",
+    )
+    averaging: float = Field(
+        0.995, ge=0, lt=1, description="Decay per update of the running average that is kept."
+    )
+    temperature: float = Field(
+        1.0, gt=0, description="Below 1 what is likely becomes likelier: less speckle, less variety."
+    )
+    keeps_way_open: bool = Field(
+        True,
+        description="A cell that would close the last way for the target robot stays free.",
+    )
     least_environments: int = Field(
         30, ge=2, description="With fewer to learn from, mirror images are drawn instead."
     )

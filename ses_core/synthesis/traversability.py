@@ -47,7 +47,7 @@ def traversable(cells: BoolArray, *, radius: float) -> BoolArray:
     Raises:
         ValueError: The cells are no stack of environments, or the radius is out of range.
     """
-    _check_radius(radius)
+    check_radius(radius)
     if cells.ndim != 3 or cells.shape[1:] != (ENVIRONMENT_CELLS, ENVIRONMENT_CELLS):
         raise ValueError(f"environments have shape {cells.shape}, expected (N, 30, 30)")
     answers = np.zeros(len(cells), dtype=np.bool_)
@@ -130,7 +130,7 @@ def shortest_path(cells: BoolArray, radius: float) -> FloatArray | None:
 
 def path_through(course: OccupancyGrid, clearance: FloatArray, radius: float) -> FloatArray | None:
     """Find the shortest way through a course whose `node_clearance` is known already."""
-    _check_radius(radius)
+    check_radius(radius)
     free = clearance >= radius - _EPSILON
     spacing = course.resolution / NODES_PER_CELL
     start = np.rint((np.array([0.0, 0.0]) - course.origin) / spacing).astype(np.int64)
@@ -157,7 +157,12 @@ def node_clearance(course: OccupancyGrid) -> FloatArray:
     return distance * (course.resolution / NODES_PER_CELL)
 
 
-def _check_radius(radius: float) -> None:
+def check_radius(radius: float) -> None:
+    """Refuse a disc for which `traversable` would not be exact.
+
+    Raises:
+        ValueError: The radius [m] is out of range.
+    """
     if not 0.0 < radius < RADIUS_LIMIT_M:
         raise ValueError(
             f"robot has an inscribed radius of {radius:.3f} m, "
