@@ -39,7 +39,7 @@ FORMATS: dict[FleetFormat, str] = {
 TOPICS = ("/scan", "/odom", "/cmd_vel")
 ROUNDS = 5
 MESSAGES = 100_000
-DEPLOYMENTS = 110
+DEPLOYMENTS = 40
 LIMITS = DecoderLimits()
 
 Columns = dict[str, NDArray[Any]]

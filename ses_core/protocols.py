@@ -13,6 +13,7 @@ from ses_core.extraction.recording import Recording
 from ses_core.navigation import NavigationDomain, NavigationTask
 from ses_core.recipes import ArtifactRef, Recipe
 from ses_core.robot_profile import RobotProfile
+from ses_core.simulation.trace import Trace
 
 
 class LogReader(Protocol):
@@ -88,6 +89,10 @@ class Simulator(Protocol):
 
     def advance(self, parameters: FloatArray, ticks: int) -> None:
         """Run control ticks under planner parameters (N, 7)."""
+        ...
+
+    def trace_into(self, trace: Trace) -> None:
+        """Write every tick from now on into arrays of N slots, as long as an episode lasts."""
         ...
 
     def scans(self) -> Float32Array:

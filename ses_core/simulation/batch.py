@@ -30,7 +30,11 @@ from ses_core.simulation.episode_start import draw_start
 from ses_core.simulation.robot import robot_model
 from ses_core.simulation.state import SLOT_DTYPE, BatchState, Memory, Scratch, snapshot
 from ses_core.simulation.tick import ADVANCE, PLAN, SENSE, SETTLE, Outside, run_share
+from ses_core.simulation.trace import NO_TRACE, Trace
 from ses_core.simulation.world_pool import WorldPool, describe_world, known_map
+
+_GROWTH = 2
+"""A slot whose map has become too large gets this many times its room, if any world wants it."""
 
 _NO_PARAMETERS = np.zeros((0, len(PARAMETER_NAMES)))
 
@@ -73,6 +77,7 @@ class BatchSimulator:
         self._memory = _memory(slots, beams=profile.laser.beams, levels=self._levels, cells=slots)
         self._threads = ThreadPoolExecutor(max_workers=threads, thread_name_prefix="simulator")
         self._scratch = _scratch(threads=threads, largest_map=1)
+        self._trace = NO_TRACE
         self._outside = Outside(
             commands=np.zeros((0, 2)),
             poses=np.zeros((0, 3)),
@@ -116,6 +121,10 @@ class BatchSimulator:
     def advance(self, parameters: FloatArray, ticks: int) -> None:
         """Run control ticks under planner parameters (N, 7)."""
         self._run(ADVANCE, self._outside, parameters=self._checked(parameters), ticks=ticks)
+
+    def trace_into(self, trace: Trace) -> None:
+        """Write every tick from now on into arrays of N slots, as long as an episode lasts."""
+        self._trace = trace
 
     def plan_commands(self, parameters: FloatArray) -> FloatArray:
         """Plan one tick; give what reaches the wheels now (N, 2) [m/s, rad/s], 0 where finished."""
@@ -194,6 +203,7 @@ class BatchSimulator:
                 parameters,
                 ticks,
                 outside,
+                self._trace,
             )
 
         list(self._threads.map(run, range(workers)))
@@ -241,12 +251,15 @@ class BatchSimulator:
     def _place_maps(self) -> None:
         """Give every slot room for its map; what others have seen moves with them."""
         sizes = self._slots["map_width"] * self._slots["map_height"]
-        if np.all(sizes <= self._map_sizes):
+        too_small = sizes > self._map_sizes
+        if not too_small.any():
             return
         old = self._memory
         before = self._slots["map_offset"].copy()
         kept = self._map_sizes
-        self._map_sizes = np.maximum(self._map_sizes, sizes)
+        # Room to grow: moving all maps for every larger world took a tenth of a fleet's day.
+        grown = np.minimum(_GROWTH * kept, sizes.max())
+        self._map_sizes = np.where(too_small, np.maximum(grown, sizes), kept)
         self._slots["map_offset"] = np.concatenate(([0], np.cumsum(self._map_sizes)[:-1]))
         total = int(self._map_sizes.sum())
         self._memory = old._replace(

@@ -28,6 +28,7 @@ from ses_core.simulation.batch import BatchSimulator, CostmapView
 from ses_core.simulation.jackal_urdf import CHASSIS_LINK, WHEELS, robot_frame, robot_urdf
 from ses_core.simulation.rendering import RenderedWorld, render
 from ses_core.simulation.state import BatchState
+from ses_core.simulation.trace import Trace
 
 PHYSICS_RATE_HZ = 240
 
@@ -97,6 +98,10 @@ class BulletSimulator:
                 contacts[number] = body.drive(commands[number], substeps=self._substeps)
                 poses[number], velocities[number] = body.pose(), body.velocity()
             self._stack.settle(poses, velocities, contacts)
+
+    def trace_into(self, trace: Trace) -> None:
+        """Write every tick from now on into arrays of N slots, as long as an episode lasts."""
+        self._stack.trace_into(trace)
 
     def scans(self) -> Float32Array:
         """Give the newest scan (N, B) [m] of every slot."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ses_core.arrays import BoolArray, FloatArray
-from ses_core.compilation import compiled
+from ses_core.compilation import compiled, compiled_in_place
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.planning.costmap import inflation_costs
 from ses_core.planning.distance_maps import measure_distances
@@ -22,6 +22,7 @@ from ses_core.simulation.motion import move, remember_pose, settle, wheel_comman
 from ses_core.simulation.robot import RobotModel
 from ses_core.simulation.sensing import sense
 from ses_core.simulation.state import Memory, Scratch, Slot
+from ses_core.simulation.trace import Trace
 
 _RUNNING = int(EpisodeOutcome.RUNNING)
 
@@ -93,6 +94,7 @@ def run_share(
     parameters: FloatArray,
     ticks: int,
     outside: Outside,
+    trace: Trace,
 ) -> None:
     """Run one phase in every `workers`-th slot from the `worker`-th on.
 
@@ -121,6 +123,8 @@ def run_share(
                 remember_pose(slot, memory, number)
             if is_due:
                 sense(slot, memory, number, robot, setup, scratch, worker)
+            if phase != PLAN:
+                _note_tick(trace, slot, memory, number, setup.sense_every, is_due)
             if slot.outcome != _RUNNING:
                 break
 
@@ -133,3 +137,25 @@ def _take_over(
     x, y, yaw = outside.poses[number, 0], outside.poses[number, 1], outside.poses[number, 2]
     v, w = outside.velocities[number, 0], outside.velocities[number, 1]
     settle(slot, memory, number, setup, x, y, yaw, v, w, outside.chosen[number])
+
+
+@compiled_in_place
+def _note_tick(
+    trace: Trace, slot: Slot, memory: Memory, number: int, sense_every: int, has_sensed: bool
+) -> None:
+    """Write down the tick that a slot has just ended, and the scan that arrived with it."""
+    row = slot.tick
+    if number >= trace.poses.shape[0] or row >= trace.poses.shape[1]:
+        return
+    trace.poses[number, row, 0] = slot.true_x
+    trace.poses[number, row, 1] = slot.true_y
+    trace.poses[number, row, 2] = slot.true_yaw
+    trace.odometry[number, row, 0] = slot.x
+    trace.odometry[number, row, 1] = slot.y
+    trace.odometry[number, row, 2] = slot.yaw
+    trace.velocities[number, row, 0], trace.velocities[number, row, 1] = slot.v, slot.w
+    trace.commands[number, row, 0] = slot.command_v
+    trace.commands[number, row, 1] = slot.command_w
+    if has_sensed:
+        for beam in range(trace.scans.shape[2]):
+            trace.scans[number, row // sense_every, beam] = memory.scans[number, beam]

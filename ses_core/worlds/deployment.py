@@ -20,6 +20,7 @@ from ses_core.protocols import Policy, Simulator
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.factory import SimulatorName, make_simulator
+from ses_core.simulation.trace import make_trace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,12 +104,9 @@ def _drive_all(
             seeds = [_task_seed(seed, number) for number in driven[slots].tolist()]
             simulator.reset(slots, chosen, np.array(seeds, dtype=np.int64))
             parameters[slots] = initial_parameters(len(slots))
-            recorder.restart(slots)
         observations = observer.observe(simulator.scans(), simulator.state(), parameters)
         parameters = policy.act(observations)
-        for _ in range(ticks):
-            simulator.advance(parameters, 1)
-            recorder.record()
+        simulator.advance(parameters, ticks)
         finished = (simulator.state().outcomes != EpisodeOutcome.RUNNING) & (driven >= 0)
         idle = np.flatnonzero(finished | (driven < 0))
         for slot in np.flatnonzero(finished).tolist():
@@ -124,66 +122,40 @@ def _task_seed(seed: int, number: int) -> int:
 
 
 class _Recorder:
-    """What the running deployments have done so far, in arrays of a whole episode's length."""
+    """What the running deployments have done so far."""
 
     def __init__(self, simulator: Simulator, simulation: SimulationSettings, *, beams: int) -> None:
         self._simulator = simulator
         self._scan_every = max(1, round(simulation.control_rate_hz / simulation.sensing_rate_hz))
-        steps = round(simulation.time_limit_s * simulation.control_rate_hz) + 1
-        slots, scans = simulator.slots, (steps - 1) // self._scan_every + 1
         self._scan_delay = resolve(simulation.imperfections).scan_delay_ticks
-        self._poses = np.zeros((slots, steps, 3))
-        self._odometry = np.zeros((slots, steps, 3))
-        self._measured = np.zeros((slots, steps, 2))
-        self._commands = np.zeros((slots, steps, 2))
-        self._ranges = np.zeros((slots, scans, beams), dtype=np.float32)
-        self._steps = np.full(slots, -1)
-
-    def restart(self, slots: IntArray) -> None:
-        """Begin anew in these slots, with where they stand and what they see now."""
-        self._steps[slots] = -1
-        self._write(slots, np.zeros(len(slots), dtype=np.int64))
-
-    def record(self) -> None:
-        """Record a tick of every slot that has moved on by one."""
-        ticks = np.rint(self._simulator.state().times / self._simulator.time_step).astype(np.int64)
-        moved = np.flatnonzero((ticks > self._steps) & (self._steps >= 0))
-        self._write(moved, ticks[moved])
+        self._trace = make_trace(
+            simulator.slots,
+            ticks=round(simulation.time_limit_s * simulation.control_rate_hz),
+            sense_every=self._scan_every,
+            beams=beams,
+        )
+        simulator.trace_into(self._trace)
 
     def deployment(self, slot: int, number: int, task: NavigationTask, seed: int) -> Deployment:
         """Copy what a finished slot has recorded."""
-        last = int(self._steps[slot])
-        arrivals = np.arange(0, last + 1, self._scan_every)
+        state, trace, period = self._simulator.state(), self._trace, self._simulator.time_step
+        steps = round(float(state.times[slot]) / period) + 1
+        arrivals = np.arange(0, steps, self._scan_every)
         # What arrives before the first delay is over shows the start once more.
         is_new = (arrivals == 0) | (arrivals > self._scan_delay)
         return Deployment(
             number=number,
             task=task,
             seed=seed,
-            outcome=EpisodeOutcome(int(self._simulator.state().outcomes[slot])),
-            times=np.arange(last + 1, dtype=np.float64) * self._simulator.time_step,
-            poses=self._poses[slot, : last + 1].copy(),
-            odometry=_from_start(self._odometry[slot, : last + 1]),
-            measured=self._measured[slot, : last + 1].copy(),
-            commands=self._commands[slot, :last].copy(),
+            outcome=EpisodeOutcome(int(state.outcomes[slot])),
+            times=np.arange(steps, dtype=np.float64) * period,
+            poses=trace.poses[slot, :steps].copy(),
+            odometry=_from_start(trace.odometry[slot, :steps]),
+            measured=trace.velocities[slot, :steps].copy(),
+            commands=trace.commands[slot, 1:steps].copy(),
             scan_steps=np.maximum(arrivals - self._scan_delay, 0)[is_new],
-            ranges=self._ranges[slot, : len(arrivals)][is_new].copy(),
+            ranges=trace.scans[slot, : len(arrivals)][is_new].copy(),
         )
-
-    def _write(self, slots: IntArray, steps: IntArray) -> None:
-        if not len(slots):
-            return
-        state = self._simulator.state()
-        self._poses[slots, steps] = state.poses[slots]
-        self._odometry[slots, steps] = state.odometry[slots]
-        self._measured[slots, steps] = state.velocities[slots]
-        later = steps > 0
-        self._commands[slots[later], steps[later] - 1] = state.commands[slots[later]]
-        self._steps[slots] = steps
-        seeing = steps % self._scan_every == 0
-        if seeing.any():
-            scans = self._simulator.scans()
-            self._ranges[slots[seeing], steps[seeing] // self._scan_every] = scans[slots[seeing]]
 
 
 def _from_start(poses: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from ses_core.navigation import NavigationTask, World
 from ses_core.occupancy import OccupancyGrid
 from ses_core.planning.parameters import DWA_SLOW
 from ses_core.protocols import Simulator
+from ses_core.simulation.trace import make_trace
 
 SECOND = 20
 
@@ -22,6 +23,7 @@ def check_simulator(make: Callable[[int], Simulator], *, beams: int = 720) -> No
     _check_what_the_robot_believes(make(1))
     _check_same_seed_same_bytes(make)
     _check_finished_slots_stay(make(2))
+    _check_a_trace_is_what_was_seen_after_each_tick(make)
 
 
 def _task(length: float = 3.0) -> NavigationTask:
@@ -118,3 +120,28 @@ def _check_finished_slots_stay(simulator: Simulator) -> None:
 
 def _columns(state: object) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.generic]], ...]:
     return astuple(state)  # type: ignore[call-overload]  # every simulator's state is a dataclass
+
+
+def _check_a_trace_is_what_was_seen_after_each_tick(make: Callable[[int], Simulator]) -> None:
+    ticks, sense_every = 3 * SECOND, 4
+    seen, traced = make(2), make(2)
+    beams = seen.scans().shape[1]
+    trace = make_trace(2, ticks=ticks, sense_every=sense_every, beams=beams)
+    traced.trace_into(trace)
+    for simulator in (seen, traced):
+        simulator.reset(np.arange(2), [_task(), _task(1.3)], np.array([1, 2]))
+    traced.advance(_parameters(traced), ticks)
+    for row in range(ticks + 1):
+        state = seen.state()
+        moved = np.rint(state.times / seen.time_step) == row
+        for name in ("poses", "odometry", "velocities", "commands"):
+            expected = getattr(state, name)[moved]
+            np.testing.assert_array_equal(getattr(trace, name)[moved, row], expected, name)
+        if row % sense_every == 0:
+            scans = seen.scans()[moved]
+            np.testing.assert_array_equal(trace.scans[moved, row // sense_every], scans)
+        seen.advance(_parameters(seen), 1)
+    # The second one has arrived by then, and stays as it ended.
+    assert not moved[1]
+    for simulator in (seen, traced):
+        simulator.close()
