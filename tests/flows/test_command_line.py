@@ -38,7 +38,7 @@ def store(tmp_path: Path) -> Path:
         ("nihgtly", "unknown command 'nihgtly'", "nightly"),
         ("nightly", "no --inbox", "a value"),
         ("nightly --inbox /none", "nothing at /none", "a folder"),
-        ("nightly --inbox / --synthesizer vae", "'vae'", "'gan', 'pca', 'rs', 'identity'"),
+        ("nightly --inbox / --synthesizer vae", "'vae'", "'medoids', 'identity', 'mirror'"),
         ("nightly --inbox / --environments many", "'many'", "a valid integer"),
         ("nightly --inbox / --date soon", "'soon'", "%Y-%m-%d"),
         ("nightly --inbox / --threshold 50 --challenging-share 0.2", "both", "one of them"),
