@@ -5,6 +5,7 @@ import pytest
 from numpy.random import default_rng
 
 from ses_core.errors import SynthesisError
+from ses_core.protocols import FittedSynthesizer
 from ses_core.synthesis.factory import make_synthesizer, rebuild_synthesizer
 from ses_core.synthesis_settings import SynthesizerSettings
 from tests.contracts.synthesizer import check_drawing_is_light, check_synthesizer
@@ -23,7 +24,7 @@ def test_every_synthesizer_keeps_the_contract(settings: SynthesizerSettings) -> 
 
 
 def test_drawing_from_what_is_stored_needs_no_heavy_library(tmp_path: Path) -> None:
-    fits = {
+    fits: dict[str, FittedSynthesizer] = {
         settings.method: make_synthesizer(settings, environments=20).fit(
             domain_of(rooms(40)), rng=default_rng(0), progress=lambda _: None
         )
