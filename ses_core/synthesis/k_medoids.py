@@ -57,14 +57,14 @@ def k_medoids(
     """
     found: list[tuple[int, IntArray]] = []
     for number in range(STARTS):
-        medoids = _spread_start(distances, weights, count=min(count, len(weights)), rng=rng)
+        medoids = spread_start(distances, weights, count=min(count, len(weights)), rng=rng)
         found.append((int(improve(distances, weights, medoids)), medoids))
         progress((number + 1) / STARTS)
     loss, medoids = min(found, key=lambda pair: pair[0])
     return Partition(medoids=medoids, nearest=distances[medoids].argmin(axis=0), loss=loss)
 
 
-def _spread_start(
+def spread_start(
     distances: Int16Array, weights: IntArray, *, count: int, rng: Generator
 ) -> IntArray:
     """Draw points (k,), each as likely as it adds to the loss of those before it.
@@ -102,7 +102,7 @@ def improve(distances: Int16Array, weights: IntArray, medoids: IntArray) -> int:
     places = np.empty((points, 2), dtype=np.int64)
     apart = np.empty((points, 2), dtype=np.int64)
     for point in range(points):
-        _find_two_nearest(distances, medoids, point, places, apart)
+        find_two_nearest(distances, medoids, point, places, apart)
     candidate = 0
     tried_in_vain = 0
     while tried_in_vain < points:
@@ -115,7 +115,7 @@ def improve(distances: Int16Array, weights: IntArray, medoids: IntArray) -> int:
                 is_medoid[medoids[position]] = False
                 is_medoid[candidate] = True
                 medoids[position] = candidate
-                _follow_swap(distances, medoids, position, places, apart)
+                follow_swap(distances, medoids, position, places, apart)
                 tried_in_vain = 0
         candidate = (candidate + 1) % points
     return (weights * apart[:, 0]).sum()
@@ -141,14 +141,14 @@ def _best_swap(
 
 
 @compiled
-def _follow_swap(
+def follow_swap(
     distances: Int16Array, medoids: IntArray, position: int, places: IntArray, apart: IntArray
 ) -> None:
     """Bring the two nearest medoids of every point up to date with the new one at a position."""
     for point in range(places.shape[0]):
         distance = distances[medoids[position], point]
         if position in (places[point, 0], places[point, 1]):
-            _find_two_nearest(distances, medoids, point, places, apart)
+            find_two_nearest(distances, medoids, point, places, apart)
         elif distance < apart[point, 0]:
             places[point, 1], apart[point, 1] = places[point, 0], apart[point, 0]
             places[point, 0], apart[point, 0] = position, distance
@@ -157,9 +157,10 @@ def _follow_swap(
 
 
 @compiled
-def _find_two_nearest(
+def find_two_nearest(
     distances: Int16Array, medoids: IntArray, point: int, places: IntArray, apart: IntArray
 ) -> None:
+    """Look up a point's two nearest medoids among all; position -1 where there is no second."""
     places[point] = -1
     apart[point] = _FAR
     for position in range(medoids.size):

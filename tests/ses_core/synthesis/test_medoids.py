@@ -8,7 +8,14 @@ from numpy.random import Generator, default_rng
 
 from ses_core.arrays import BoolArray, IntArray
 from ses_core.synthesis.fixed_order import FixedOrder
-from ses_core.synthesis.k_medoids import Int16Array, improve, k_medoids
+from ses_core.synthesis.k_medoids import (
+    Int16Array,
+    find_two_nearest,
+    follow_swap,
+    improve,
+    k_medoids,
+    spread_start,
+)
 from ses_core.synthesis.medoids import Medoids
 from tests.ses_core.synthesis.places import domain_of, families, family_of, rooms
 
@@ -92,13 +99,49 @@ def test_never_worse_than_fifty_restarts_of_the_naive_way(count: int, wanted: in
         assert k_medoids(distances, weights, count=wanted, rng=default_rng(seed)).loss <= naive
 
 
-@pytest.mark.parametrize("wanted", [1, 2, 7])
-def test_the_search_works_in_place_from_any_start(wanted: int) -> None:
-    distances, weights = random_points(40, 5)
-    medoids = np.arange(wanted, dtype=np.int64)
-    before = loss_of(distances, weights, medoids)
-    assert int(improve(distances, weights, medoids)) == loss_of(distances, weights, medoids)
-    assert loss_of(distances, weights, medoids) < before
+@pytest.mark.parametrize("wanted", [1, 2, 7, 25])
+def test_from_any_start_no_swap_is_left_that_helps(wanted: int) -> None:
+    for seed in range(12):
+        distances, weights = random_points(70, seed)
+        medoids = np.arange(wanted, dtype=np.int64)
+        loss = int(improve(distances, weights, medoids))
+        assert len(set(medoids.tolist())) == wanted
+        assert loss == loss_of(distances, weights, medoids)
+        for position in range(wanted):
+            others = distances[np.delete(medoids, position)].min(axis=0, initial=999)
+            swapped = np.minimum(distances, others).astype(np.int64) @ weights
+            assert swapped.min() >= loss
+
+
+def test_after_a_swap_the_two_nearest_are_those_that_are_found_anew() -> None:
+    distances, _ = random_points(50, 1)
+    rng = default_rng(0)
+    medoids = np.arange(6, dtype=np.int64)
+    places, apart = np.empty((2, 50, 2), dtype=np.int64)
+    for point in range(50):
+        find_two_nearest(distances, medoids, point, places, apart)
+    for _ in range(60):
+        position = int(rng.integers(6))
+        medoids[position] = rng.choice(np.setdiff1d(np.arange(50), medoids))
+        follow_swap(distances, medoids, position, places, apart)
+        rows = np.arange(50)[:, None]
+        assert np.array_equal(distances[rows, medoids[places]], apart)
+        assert np.array_equal(np.sort(distances[:, medoids], axis=1)[:, :2], apart)
+
+
+def test_a_start_is_drawn_by_what_each_point_adds_to_the_loss() -> None:
+    distances, weights = random_points(6, 3)
+    rng = default_rng(0)
+    hits = np.zeros((6, 6))
+    for _ in range(4000):
+        first, second = spread_start(distances, weights, count=2, rng=rng)
+        hits[first, second] += 1
+    adds = weights * distances.astype(np.int64)
+    expected = (weights / weights.sum())[:, None] * adds / adds.sum(axis=1, keepdims=True)
+    # 36 cells of a multinomial; five deviations.
+    assert np.all(np.abs(hits - 4000 * expected) <= 5 * np.sqrt(4000 * expected))
+    everyone = spread_start(distances, weights, count=6, rng=rng)
+    assert sorted(everyone.tolist()) == list(range(6))
 
 
 def fit(cells: BoolArray, *, environments: int, seed: int = 0) -> FixedOrder:
@@ -120,13 +163,25 @@ def test_the_medoid_of_the_largest_family_comes_first_then_the_next_nearest_in_t
         assert np.abs(own - own[0]).sum(axis=1).tolist() == nearest[: len(own)]
 
 
-def test_equal_environments_never_make_equal_medoids_but_count_as_often_as_recorded() -> None:
+def test_equal_environments_never_make_equal_medoids() -> None:
     cells = np.unique(rooms(12), axis=0)
     often = np.concatenate((np.repeat(cells[3:4], 30, axis=0), cells, cells))
     drawn = fit(often, environments=5).sample(1000, rng=default_rng(0))
     assert len(drawn) == len(cells)
     assert {place.tobytes() for place in drawn} == {place.tobytes() for place in cells}
-    assert np.array_equal(fit(often, environments=1).cells[0], cells[3])
+
+
+def test_an_environment_counts_as_often_as_it_is_recorded() -> None:
+    cells, _ = families((9, 4, 12))
+    flat = cells[:9].reshape(9, 900).astype(int)
+    odd = int(np.abs(flat[:, None] - flat[None]).sum(axis=(1, 2)).argmax())
+    # The one that is farthest from the rest of its family, until it is recorded often.
+    drawn = fit(cells, environments=3).cells
+    assert [family_of(place) for place in drawn[:3]] == [2, 0, 1]
+    assert not np.array_equal(drawn[1], cells[odd])
+    drawn = fit(np.concatenate((cells, np.repeat(cells[[odd]], 20, axis=0))), environments=3).cells
+    assert [family_of(place) for place in drawn[:3]] == [0, 2, 1]
+    assert np.array_equal(drawn[0], cells[odd])
 
 
 @pytest.mark.parametrize("environments", [6, 7, 100])
