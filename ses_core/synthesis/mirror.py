@@ -4,7 +4,8 @@ Row 0 of the cells is the edge of the goal and column 0 the left edge; the start
 middle of the last row. So columns reversed are the place seen in a mirror, and rows and
 columns reversed are the place turned by half a circle: the same way driven from the goal to
 the start. Both at once are rows reversed alone. A disc that gets across one of the four gets
-across all.
+across all. That the fleet found one of them hard does not say that the way back, which
+meets the same gap from its other side, is hard as well.
 """
 
 from collections.abc import Callable, Mapping
