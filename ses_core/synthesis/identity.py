@@ -7,28 +7,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from ses_core.arrays import BoolArray
 from ses_core.navigation import NavigationDomain
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FittedIdentity:
-    """Hands out recorded environments in their order; cells: (N, 30, 30)."""
-
-    cells: BoolArray
-
-    def sample(
-        self,
-        count: int,
-        *,
-        rng: Generator,  # noqa: ARG002  (the seam's: the order is the domain's)
-    ) -> BoolArray:
-        """Give the first ones; fewer than `count` where there are no more."""
-        return self.cells[:count].copy()
-
-    def arrays(self) -> Mapping[str, NDArray[np.generic]]:
-        """Give what rebuilds it."""
-        return {"cells": self.cells}
+from ses_core.protocols import FittedSynthesizer
+from ses_core.synthesis.fixed_order import FixedOrder, order_from_arrays
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +22,13 @@ class Identity:
         *,
         rng: Generator,  # noqa: ARG002  (the seam's: nothing is drawn here)
         progress: Callable[[float], None],
-    ) -> FittedIdentity:
+        start: FittedSynthesizer | None = None,  # noqa: ARG002  (the seam's: nothing is learned)
+    ) -> FixedOrder:
         """Keep the domain's cells."""
         progress(1.0)
-        return FittedIdentity(cells=domain.cells())
+        return FixedOrder(cells=domain.cells())
+
+
+def identity_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> FixedOrder:
+    """Rebuild a fit from its `arrays()`."""
+    return order_from_arrays(arrays)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ses_core.arrays import BoolArray
 from ses_core.navigation import NavigationDomain
+from ses_core.protocols import FittedSynthesizer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +37,13 @@ class RandomSampling:
         *,
         rng: Generator,  # noqa: ARG002  (the seam's: nothing is drawn here)
         progress: Callable[[float], None],
+        start: FittedSynthesizer | None = None,  # noqa: ARG002  (the seam's: nothing is learned)
     ) -> FittedRandomSampling:
         """Keep the domain's cells."""
         progress(1.0)
         return FittedRandomSampling(cells=domain.cells())
+
+
+def sampling_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> FittedRandomSampling:
+    """Rebuild a fit from its `arrays()`."""
+    return FittedRandomSampling(cells=np.asarray(arrays["cells"], dtype=np.bool_))

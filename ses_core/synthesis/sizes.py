@@ -1,30 +1,49 @@
 """What synthesis does with few environments: one table, nothing silent.
 
-With N environments to learn from, M asked for:
+With N environments to learn from and M = 100 asked for, by default settings:
 
-| N | `gan` | `pca` | `rs`, `identity` |
-| --- | --- | --- | --- |
-| 0 | refused | refused | refused |
-| 1 | `identity` | `identity` | that one |
-| < `least_environments` (30) | `identity` | as below | as below |
-| < components + 1 (101) | as asked | N - 1 components | as asked |
-| < M | M new ones | N, each once | N, each once |
+| N | gan, gan-paper, autoregressive | pca, pca-paper | rs, identity, medoids | mirror |
+| --- | --- | --- | --- | --- |
+| 0 | refused | refused | refused | refused |
+| 1 | 4 by mirror | 1 by identity | 1 | 4 |
+| 5 | 20 by mirror | 5 of 4 components | 5 | 20 |
+| 30 | 100 | 30 of 29 components | 30 | 100 |
+| 99 | 100 | 99 of 98 components | 99 | 100 |
+| 300 | 100 | 100 | 100 | 100 |
 
-A generator taught by less than some thirty places repeats them with noise (measured: it
-learns speckle before walls), so they are copied instead, as in the paper's own physical
-experiment. What was done stands in the plan, its notes reach the report.
+These are the most: what cannot be crossed, and what equals another one, is passed over. Then
+the notes of the result say how many there are.
+
+A generator taught by fewer than `least_environments` places repeats them with noise (measured:
+it learns speckle before walls), so these places are given instead, with their mirror images and
+both the other way round. A method that hands out recorded places never repeats one. N
+environments span N - 1 principal components; a single one spans none and is copied. What was
+done stands in the plan, its notes reach the report.
 """
 
 from dataclasses import dataclass
 
 from ses_core.errors import SynthesisError
+from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.synthesis_settings import (
+    AutoregressiveSettings,
+    GanPaperSettings,
     GanSettings,
     IdentitySettings,
+    MirrorSettings,
+    PcaPaperSettings,
     PcaSettings,
     SynthesisSettings,
     SynthesizerSettings,
 )
+
+COURSES_PER_PLACE = 4
+"""A place as it is, mirrored, the other way round, and both (`ses_core.synthesis.mirror`)."""
+
+_Learned = GanSettings | GanPaperSettings | AutoregressiveSettings
+"""What makes as many new environments as are asked for."""
+
+_Pca = PcaSettings | PcaPaperSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,34 +73,42 @@ def plan_synthesis(settings: SynthesisSettings, *, available: int) -> SynthesisP
         )
     synthesizer, notes = _fitting_synthesizer(settings.synthesizer, available)
     environments = settings.environments
-    if synthesizer.method != "gan" and available < environments:
+    if not isinstance(synthesizer, _Learned):
+        environments = min(environments, _most_environments(synthesizer, available))
+    if environments < settings.environments:
         notes.append(
-            f"{available} environments instead of {environments}: "
-            f"{synthesizer.method} never repeats one, and there are no more"
+            f"{environments} environments instead of {settings.environments}: "
+            f"{synthesizer.method} never repeats one, and {available} recorded make no more"
         )
-        environments = available
     return SynthesisPlan(synthesizer=synthesizer, environments=environments, notes=tuple(notes))
 
 
 def _fitting_synthesizer(
     asked: SynthesizerSettings, available: int
 ) -> tuple[SynthesizerSettings, list[str]]:
-    least = _least_environments(asked)
-    if available < least:
-        return IdentitySettings(), [
-            f"identity instead of {asked.method}: "
-            f"{available} environments to learn from, {asked.method} needs {least}"
-        ]
-    if isinstance(asked, PcaSettings) and available <= asked.components:
-        fewer = available - 1
-        return asked.model_copy(update={"components": fewer}), [
-            f"{fewer} principal components instead of {asked.components}: "
-            f"{available} environments have no more"
-        ]
+    if isinstance(asked, _Learned) and available < asked.least_environments:
+        return MirrorSettings(), [_instead("mirror", asked, available, asked.least_environments)]
+    if isinstance(asked, _Pca):
+        if available == 1:
+            return IdentitySettings(), [_instead("identity", asked, available, 2)]
+        most = min(available - 1, ENVIRONMENT_CELLS**2)
+        if asked.components > most:
+            return asked.model_copy(update={"components": most}), [
+                f"{most} principal components instead of {asked.components}: "
+                f"{available} environments have no more"
+            ]
     return asked, []
 
 
-def _least_environments(asked: SynthesizerSettings) -> int:
-    if isinstance(asked, GanSettings):
-        return asked.least_environments
-    return 2 if isinstance(asked, PcaSettings) else 1
+def _instead(used: str, asked: SynthesizerSettings, available: int, least: int) -> str:
+    return (
+        f"{used} instead of {asked.method}: "
+        f"{available} environments to learn from, {asked.method} needs {least}"
+    )
+
+
+def _most_environments(synthesizer: SynthesizerSettings, available: int) -> int:
+    """How many it can hand on without a repetition, if no two of the recorded ones are equal."""
+    if isinstance(synthesizer, MirrorSettings):
+        return COURSES_PER_PLACE * available
+    return available

@@ -1,15 +1,18 @@
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
+from typing import get_args
 
 import pytest
 import typer.main
 from typer.core import TyperCommand, TyperGroup
 
 from flows.command_line import app, run
+from ses_core.synthesis_settings import SynthesizerSettings
 from storage.batch_manifest import RunRecord, record_run
 from storage.layout import open_layout
 
@@ -38,7 +41,8 @@ def store(tmp_path: Path) -> Path:
         ("nihgtly", "unknown command 'nihgtly'", "nightly"),
         ("nightly", "no --inbox", "a value"),
         ("nightly --inbox /none", "nothing at /none", "a folder"),
-        ("nightly --inbox / --synthesizer vae", "'vae'", "'gan', 'pca', 'rs', 'identity'"),
+        ("nightly --inbox / --synthesizer vae", "'vae'", "'medoids', 'identity', 'mirror'"),
+        ("synthesize --out x --method vae", "'vae'", "'pca', 'pca-paper', 'rs', 'medoids'"),
         ("nightly --inbox / --environments many", "'many'", "a valid integer"),
         ("nightly --inbox / --date soon", "'soon'", "%Y-%m-%d"),
         ("nightly --inbox / --threshold 50 --challenging-share 0.2", "both", "one of them"),
@@ -112,6 +116,18 @@ def test_help_of_every_command_has_an_example_of_it(
 
     text = " ".join(capfd.readouterr().out.split())
     assert f"Example: {' '.join(('ses', *path))}" in text
+
+
+@pytest.mark.parametrize("command", ["synthesize", "nightly"])
+def test_help_lists_every_synthesizer_there_are_settings_for(
+    command: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert run([command, "--help"]) == 0
+    kinds = get_args(get_args(SynthesizerSettings)[0])
+    methods = {kind.model_fields["method"].default for kind in kinds}
+    listed = re.findall(r"<(gan\|[^>]*)>", capfd.readouterr().out)
+    assert [set(names.split("|")) for names in listed] == [methods]
 
 
 def test_options_are_accepted_before_and_after_the_command(

@@ -114,7 +114,7 @@ def test_a_rule_across_settings_is_told_in_its_own_words(tmp_path: Path) -> None
 def test_an_unknown_method_lists_the_known_ones(tmp_path: Path) -> None:
     message = problem('synthesis.synthesizer.method = "gam"', tmp_path)
     assert "'gam'" in message
-    assert "'gan', 'pca', 'rs', 'identity'" in message
+    assert "'gan', 'pca-paper', 'pca', 'rs', 'medoids', 'identity', 'mirror'" in message
 
 
 def test_a_file_that_is_no_toml_or_absent_is_named(tmp_path: Path) -> None:

@@ -8,22 +8,13 @@ from ses_core.errors import ArtifactError
 from ses_core.robot_profile import JACKAL
 from ses_core.synthesis.synthesize import FittedSynthesis, draw_environments, fit_synthesis
 from ses_core.synthesis_settings import (
-    GanSettings,
-    IdentitySettings,
-    PcaSettings,
     RandomSamplingSettings,
     SynthesisSettings,
     SynthesizerSettings,
 )
 from storage.synthesizer_files import ARRAYS_FILE, PLAN_FILE, read_synthesizer, write_synthesizer
-from tests.ses_core.synthesis.places import domain_of, rooms
+from tests.ses_core.synthesis.places import QUICK_SYNTHESIZERS, domain_of, rooms
 
-ALL = (
-    GanSettings(epochs=1, least_updates=4),
-    PcaSettings(components=70),
-    RandomSamplingSettings(),
-    IdentitySettings(),
-)
 DOMAIN = domain_of(rooms(60))
 
 
@@ -34,7 +25,7 @@ def fitted(synthesizer: SynthesizerSettings) -> tuple[FittedSynthesis, Synthesis
     ), settings
 
 
-@pytest.mark.parametrize("synthesizer", ALL, ids=lambda item: item.method)
+@pytest.mark.parametrize("synthesizer", QUICK_SYNTHESIZERS, ids=lambda item: item.method)
 def test_reading_back_gives_the_same_plan_and_the_same_environments(
     synthesizer: SynthesizerSettings, tmp_path: Path
 ) -> None:
@@ -50,7 +41,7 @@ def test_reading_back_gives_the_same_plan_and_the_same_environments(
     assert ids[0] == ids[1]
 
 
-@pytest.mark.parametrize("synthesizer", ALL, ids=lambda item: item.method)
+@pytest.mark.parametrize("synthesizer", QUICK_SYNTHESIZERS, ids=lambda item: item.method)
 def test_equal_fits_are_equal_files(synthesizer: SynthesizerSettings, tmp_path: Path) -> None:
     folders = [tmp_path / "first", tmp_path / "second"]
     for folder in folders:

@@ -1,9 +1,21 @@
-"""Drawn and random places to synthesize from."""
+"""Drawn and random places to synthesize from, and synthesizers that take no time."""
 
 import numpy as np
 
 from ses_core.arrays import BoolArray
 from ses_core.navigation import NavigationDomain, NavigationEnvironment
+from ses_core.synthesis_settings import (
+    AutoregressiveSettings,
+    GanPaperSettings,
+    GanSettings,
+    IdentitySettings,
+    MedoidsSettings,
+    MirrorSettings,
+    PcaPaperSettings,
+    PcaSettings,
+    RandomSamplingSettings,
+    SynthesizerSettings,
+)
 
 
 def domain_of(cells: BoolArray) -> NavigationDomain:
@@ -40,3 +52,36 @@ def walled_off(count: int) -> BoolArray:
         place[5 + index // 30] = True
         place[28, index % 30] = True
     return cells
+
+
+def families(sizes: tuple[int, ...]) -> tuple[BoolArray, list[int]]:
+    """Draw places in clearly separate families: a filled block each, with two cells flipped."""
+    rng = np.random.default_rng(3)
+    cells, labels = [], []
+    for family, size in enumerate(sizes):
+        for _ in range(size):
+            place = np.zeros((30, 30), dtype=np.bool_)
+            place[family * 6 : family * 6 + 5] = True
+            place[tuple(rng.integers(0, 30, (2, 2)))] ^= True
+            cells.append(place)
+            labels.append(family)
+    return np.stack(cells), labels
+
+
+def family_of(place: BoolArray) -> int:
+    """Tell which family a place is of."""
+    return int(np.argmax([place[k * 6 : k * 6 + 5].sum() for k in range(5)]))
+
+
+QUICK_SYNTHESIZERS: tuple[SynthesizerSettings, ...] = (
+    GanPaperSettings(epochs=1, least_updates=6),
+    GanSettings(epochs=1, least_updates=6),
+    PcaPaperSettings(components=12),
+    PcaSettings(components=12),
+    RandomSamplingSettings(),
+    MedoidsSettings(),
+    IdentitySettings(),
+    MirrorSettings(),
+    AutoregressiveSettings(epochs=1),
+)
+"""All nine, those that learn for a moment only: their samples are nothing to look at."""

@@ -8,19 +8,30 @@ from numpy.random import default_rng
 from ses_core.arrays import BoolArray
 from ses_core.errors import SynthesisError
 from ses_core.robot_profile import JACKAL, RASPIMOUSE
+from ses_core.synthesis.mirror import four_courses
 from ses_core.synthesis.synthesize import SynthesisResult, synthesize
 from ses_core.synthesis.traversability import traversable
 from ses_core.synthesis_settings import (
     GanSettings,
     IdentitySettings,
+    MedoidsSettings,
+    MirrorSettings,
     PcaSettings,
     RandomSamplingSettings,
     SynthesisSettings,
     SynthesizerSettings,
 )
-from tests.ses_core.synthesis.places import domain_of, rooms, walled_off
+from tests.ses_core.synthesis.places import QUICK_SYNTHESIZERS, domain_of, rooms, walled_off
 
-COPIERS: tuple[SynthesizerSettings, ...] = (RandomSamplingSettings(), IdentitySettings())
+COPIERS: tuple[SynthesizerSettings, ...] = (
+    RandomSamplingSettings(),
+    MedoidsSettings(),
+    IdentitySettings(),
+)
+
+
+RECORDED: tuple[SynthesizerSettings, ...] = (*COPIERS, MirrorSettings(), PcaSettings())
+"""What hands out recorded places, as they are or the other way round."""
 
 
 def run(
@@ -37,7 +48,7 @@ def run(
 
 @pytest.mark.parametrize(
     "synthesizer",
-    [*COPIERS, PcaSettings(), GanSettings(epochs=1, least_updates=40)],
+    QUICK_SYNTHESIZERS,
     ids=lambda item: item.method,
 )
 def test_only_distinct_environments_that_the_target_can_cross_are_handed_on(
@@ -100,10 +111,29 @@ def test_environments_are_marked_with_their_synthesizer_and_with_no_scenario() -
 
 
 def test_fall_back_is_recorded() -> None:
-    result = run(rooms(5), GanSettings(), environments=8)
-    assert (result.method_asked, result.method_used) == ("gan", "identity")
-    assert "identity instead of gan" in result.notes[0]
-    assert {item.origin for item in result.environments.environments} == {"identity"}
+    places = rooms(5)
+    result = run(places, GanSettings(), environments=100)
+    assert (result.method_asked, result.method_used) == ("gan", "mirror")
+    assert result.notes[0].startswith("mirror instead of gan")
+    assert result.notes[1].startswith("20 environments instead of 100")
+    assert {item.origin for item in result.environments.environments} == {"mirror"}
+    assert len(result.environments.environments) == len(np.unique(four_courses(places), axis=0))
+    assert sorted(result.copies.values()) == ["s0", "s1", "s2", "s3", "s4"]
+
+
+@pytest.mark.parametrize("synthesizer", RECORDED, ids=lambda item: item.method)
+@pytest.mark.parametrize("available", [1, 5, 30, 99, 300])
+def test_what_can_be_crossed_is_as_many_as_the_table_says(
+    synthesizer: SynthesizerSettings, available: int
+) -> None:
+    places = np.unique(rooms(500), axis=0)[:available]
+    assert len(places) == available
+    result = run(places, synthesizer, environments=100)
+    offered = four_courses(places) if result.method_used == "mirror" else places
+    shipped = len(result.environments.environments)
+    assert shipped == min(100, len(np.unique(offered, axis=0)))
+    if shipped < 100:
+        assert result.notes[-1].startswith(f"{shipped} environments instead of")
 
 
 def test_nothing_that_can_be_crossed_hands_on_nothing_and_says_so() -> None:
