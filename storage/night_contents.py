@@ -37,6 +37,7 @@ from storage.night_report import (
 from storage.policy_files import read_curve, read_policy
 from storage.quarantine import REASONS
 from storage.scenario_tables import environments_of
+from storage.scorecard_files import read_scored
 from storage.selection_files import StoredSelection, read_selection
 from storage.stage_records import read_record
 from storage.table_reader import open_table
@@ -88,6 +89,7 @@ def gather_night(night: NightArtifacts, *, store: LocalArtifactStore) -> NightRe
             )
             for one in synthesized.environments
         ),
+        scorecard=read_scored(store.path(night.scorecard)) if night.scorecard else None,
         training=training,
         evaluation=_evaluation(night, store=store),
         champion=None if night.parent == "original" else night.parent,
