@@ -25,7 +25,7 @@ def scorecard(
         real: Folder of the real environments, best those that were learned from.
         synthesized: Folder of the synthesized ones.
         policy: Whose drives tell how hard an environment is.
-        out: Folder for `scorecard.parquet` and `scorecard.png`.
+        out: Folder for `scorecard.parquet`, `scorecard.html` and `scorecard.png`.
         settings: Those of `scorecard` and `simulation` and the target robot matter.
     """
     return score_folders.submit(

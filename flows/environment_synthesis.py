@@ -8,8 +8,7 @@ from pydantic import BaseModel
 
 from flows.night_stages import batch_day, extract_logs, open_night, select_places
 from ses_core.settings import Settings
-from storage.environment_files import ENVIRONMENTS_FILE, read_environments
-from storage.night_contents import SYNTHESIS_FILE
+from storage.environment_files import ENVIRONMENTS_FILE, SYNTHESIS_FILE, read_environments
 from storage.night_report import SynthesisUse
 from storage.selection_files import read_pool
 from storage.stage_records import read_record

@@ -16,6 +16,12 @@ def announce_night(summary: NightSummary, records: Sequence[LogRecord]) -> None:
         key="stages",
         description="Built, found and seconds by stage",
     )
+    if summary.scorecard:
+        create_table_artifact(
+            [row.model_dump(mode="json") for row in summary.scorecard],
+            key="scorecard",
+            description="Do the synthesized environments stand for those learned from?",
+        )
     refused = [record for record in records if record.status == "quarantined"]
     if refused:
         create_table_artifact(

@@ -123,7 +123,15 @@ def _artifacts(
     )
 
 
-_REFS = ("selection", "environments", "worlds", "policy", "evaluation", "spot_check")
+_REFS = (
+    "selection",
+    "environments",
+    "scorecard",
+    "worlds",
+    "policy",
+    "evaluation",
+    "spot_check",
+)
 
 
 def _stages(night: Night) -> tuple[tuple[str, int, int, float], ...]:

@@ -5,6 +5,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ses_core.scorecard.standing import Standing
+
 StageName = Literal[
     "ingest", "extract", "filter", "synthesize", "render", "train", "evaluate", "report"
 ]
@@ -74,6 +76,23 @@ class ComparisonRow(_Part):
     ci_s: Interval | None
 
 
+class ScorecardEntry(_Part):
+    """One number of the synthesized environments beside the same one between real ones."""
+
+    metric: str
+    feature: str
+    unit: str
+    aim: str
+    value: float | None
+    low: float | None
+    high: float | None
+    real_value: float | None
+    real_low: float | None
+    real_high: float | None
+    standing: Standing = Field(description="Whether it is worse than real-against-real allows.")
+    note: str
+
+
 class NightSummary(_Part):
     """One nightly batch; keys are public (see the README)."""
 
@@ -87,6 +106,10 @@ class NightSummary(_Part):
         default_factory=dict, description="Challenging scenarios by the kind of count."
     )
     environments: int = 0
+    scorecard: list[ScorecardEntry] = Field(
+        default_factory=list,
+        description="How well the environments stand for those learned from.",
+    )
     stages: dict[str, StageCount] = Field(
         default_factory=lambda: {str(stage): StageCount() for stage in STAGES}
     )

@@ -1,12 +1,13 @@
 """A night's summary for people at a terminal."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from flows.command_context import aligned
 from ses_core.recipes import JsonValue
 
 if TYPE_CHECKING:
-    from flows.night_summary import NightSummary
+    from flows.night_summary import NightSummary, ScorecardEntry
 
 
 def describe_night(summary: "NightSummary") -> str:
@@ -20,6 +21,8 @@ def describe_night(summary: "NightSummary") -> str:
         lines.insert(1, f"              {logs.waiting} still arriving, left for the next night")
     if summary.environments:
         lines.append(f"environments  {summary.environments}")
+    if summary.scorecard:
+        lines.append(f"scorecard     {_scorecard_words(summary.scorecard)}")
     stages: list[dict[str, JsonValue]] = [
         {"stage": name, "built": count.built, "found": count.found, "seconds": count.seconds}
         for name, count in summary.stages.items()
@@ -37,3 +40,10 @@ def describe_night(summary: "NightSummary") -> str:
     if summary.report:
         lines.append(f"report        {summary.report}")
     return "\n".join(lines)
+
+
+def _scorecard_words(rows: "Sequence[ScorecardEntry]") -> str:
+    """Say how many numbers of the environments are worse than among real ones."""
+    judged = [row for row in rows if row.standing != "unknown"]
+    marked = [row for row in judged if row.standing != "within"]
+    return f"{len(marked)} of {len(judged)} numbers worse than among real environments"

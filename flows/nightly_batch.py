@@ -11,6 +11,7 @@ from prefect.task_runners import TaskRunner, ThreadPoolTaskRunner
 
 from flows.night_announcement import announce_night
 from flows.night_conclusion import conclude_night, made_nothing, measure
+from flows.night_scorecard import score_night
 from flows.night_stages import (
     Night,
     batch_day,
@@ -95,6 +96,7 @@ def learn(
     environments, worlds = synthesize_environments(night, selection_ref)
     if not night.summary.environments:
         return made_nothing(night, run_id, day=day, parent=parent, selection=selection_ref)
+    scorecard = score_night(night, selection_ref, environments)
     policy = train(night, environments, parent=parent, run_id=run_id, deadline=deadline)
     policies = {
         run_id: str(night.store.path(policy)),
@@ -111,6 +113,7 @@ def learn(
         parent=parent,
         selection=selection_ref,
         environments=environments,
+        scorecard=scorecard,
         worlds=worlds,
         policy=policy,
         evaluation=evaluation,

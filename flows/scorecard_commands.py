@@ -36,7 +36,10 @@ def scorecard(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder for scorecard.parquet and scorecard.png."),
+        typer.Option(
+            metavar="DIR",
+            help="Folder for the table, a page and a picture: scorecard.parquet, .html, .png.",
+        ),
     ] = None,
     policy: Annotated[
         str, typer.Option(metavar="NAME", help="Whose drives tell how hard a place is.")

@@ -22,6 +22,9 @@ class ScorecardSettings(SettingsModel):
         0.02, ge=0, lt=1, description="Environments this share of cells apart are near copies."
     )
     driven: int = Field(
-        200, ge=0, description="The same of the environments that the policy drives through."
+        60,
+        ge=0,
+        description="The same of the environments that a policy drives through; a drive takes some "
+        "0.1 s, one that times out several times that.",
     )
     seed: int = Field(0, ge=0, description="Of halves, shuffles and the noise of the drives.")

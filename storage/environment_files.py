@@ -13,6 +13,9 @@ from storage.scenario_tables import environments_of
 
 ENVIRONMENTS_FILE = "environments.parquet"
 
+SYNTHESIS_FILE = "synthesis.json"
+"""Beside synthesized ones: how they came to be."""
+
 _MEASURES = {
     "closest_obstacle_m": "closest_obstacle",
     "visibility_m": "visibility",

@@ -18,6 +18,7 @@ class NightArtifacts:
         reasons: Why, in sentences.
         log_ids: Logs of the night's batch.
         refused: Name, reason and message of the logs that were refused.
+        scorecard: How well the synthesized environments stand for the pool.
         spot_check: Episodes of the same policies in PyBullet.
         stages: Built, found and seconds by stage, up to here.
         is_demonstration: Whether the page has to say so.
@@ -35,6 +36,7 @@ class NightArtifacts:
     waiting_logs: int
     selection: ArtifactRef | None
     environments: ArtifactRef | None
+    scorecard: ArtifactRef | None
     worlds: ArtifactRef | None
     policy: ArtifactRef | None
     evaluation: ArtifactRef | None
@@ -47,6 +49,7 @@ class NightArtifacts:
         stages = {
             "filter": self.selection,
             "synthesize": self.environments,
+            "scorecard": self.scorecard,
             "render": self.worlds,
             "train": self.policy,
             "evaluate": self.evaluation,

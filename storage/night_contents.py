@@ -18,7 +18,7 @@ from ses_core.extraction.holdout import Holdout
 from ses_core.extraction.selection import COUNT_COLUMNS
 from ses_core.navigation import NavigationDomain, NavigationEnvironment
 from storage.artifact_store import LocalArtifactStore
-from storage.environment_files import read_environments
+from storage.environment_files import SYNTHESIS_FILE, read_environments
 from storage.evaluation_files import read_episodes
 from storage.night_artifacts import NightArtifacts
 from storage.night_report import (
@@ -37,12 +37,11 @@ from storage.night_report import (
 from storage.policy_files import read_curve, read_policy
 from storage.quarantine import REASONS
 from storage.scenario_tables import environments_of
+from storage.scorecard_files import read_scored
 from storage.selection_files import StoredSelection, read_selection
 from storage.stage_records import read_record
 from storage.table_reader import open_table
 from storage.training_record import TRAINING_FILE, TrainingRecord
-
-SYNTHESIS_FILE = "synthesis.json"
 
 
 def gather_night(night: NightArtifacts, *, store: LocalArtifactStore) -> NightReport:
@@ -90,6 +89,7 @@ def gather_night(night: NightArtifacts, *, store: LocalArtifactStore) -> NightRe
             )
             for one in synthesized.environments
         ),
+        scorecard=read_scored(store.path(night.scorecard)) if night.scorecard else None,
         training=training,
         evaluation=_evaluation(night, store=store),
         champion=None if night.parent == "original" else night.parent,

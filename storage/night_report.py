@@ -11,6 +11,7 @@ from ses_core.evaluation.statistics import PolicySummary
 from ses_core.extraction.funnel import FunnelStep
 from ses_core.learning.training_curve import CurvePoint
 from ses_core.robot_profile import RobotProfile
+from ses_core.scorecard.result import Scorecard
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,6 +175,7 @@ class NightReport:
         recorded: Rebuilt environments: the chosen, hardest first, then the rest of the night's
             own; the page shows the first ones.
         synthesized: Environments that were trained in.
+        scorecard: How well these stand for the recorded ones that were learned from.
         pictures: Further pictures: logs over their paths, rendered worlds.
         lineage: What was made from what: names and digests, in order.
         demonstration_decisions: Decisions trained, when the night is a demonstration.
@@ -192,6 +194,7 @@ class NightReport:
     recorded: tuple[ShownEnvironment, ...] = ()
     synthesis: SynthesisUse | None = None
     synthesized: tuple[ShownEnvironment, ...] = ()
+    scorecard: Scorecard | None = None
     training: TrainingUse | None = None
     evaluation: EvaluationUse | None = None
     champion: str | None = None

@@ -12,10 +12,11 @@ BATCH = Stage("batch", 1)
 FILTER = Stage("filter", 1)
 FIT = Stage("fit", 1)
 SYNTHESIZE = Stage("synthesize", 1)
+SCORECARD = Stage("scorecard", 1)
 RENDER = Stage("render", 1)
 TRAIN = Stage("train", 2)
 EVALUATE = Stage("evaluate", 3)
-REPORT = Stage("report", 2)
+REPORT = Stage("report", 3)
 PRETRAIN = Stage("pretrain", 2)
 DEPLOY = Stage("deploy", 2)
 
@@ -26,6 +27,7 @@ STAGES = (
     FILTER,
     FIT,
     SYNTHESIZE,
+    SCORECARD,
     RENDER,
     TRAIN,
     EVALUATE,
@@ -34,5 +36,5 @@ STAGES = (
     DEPLOY,
 )
 
-DISPOSABLE_STAGES = (BATCH, FIT, RENDER, REPORT)
+DISPOSABLE_STAGES = (BATCH, FIT, SCORECARD, RENDER, REPORT)
 """Stages whose artifacts only serve their own night: dropped when long unused."""

@@ -1,4 +1,4 @@
-"""Report: the night's rows in the tables, and its page."""
+"""Report: the night's rows in the tables, its page, and its scorecard beside that."""
 
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from storage.materialize import Materialized, materialize
 from storage.night_artifacts import NightArtifacts
 from storage.night_contents import gather_night
 from storage.night_tables import write_night_tables
+from storage.scorecard_files import place_scorecard, write_scorecard
 from storage.stages import REPORT
 from storage.table_log import TableLog
 from storage.table_parts import artifact_parts
@@ -31,12 +32,16 @@ def report_night(
         from storage.report_page import write_report
 
         write_night_tables(directory, night, store=store)
-        write_report(directory / PAGE, gather_night(night, store=store))
+        report = gather_night(night, store=store)
+        write_report(directory / PAGE, report)
+        if report.scorecard is not None:
+            write_scorecard(directory, report.scorecard.rows)
 
     made = materialize(store, Recipe(REPORT, night.key()), build, anew=anew)
     if night.selection is not None:
         parts = artifact_parts(store, made.ref, name=night.run_id, batch_date=night.batch_date)
         tables.commit(parts, message=f"night {night.run_id}")
-    page = (store.path(made.ref) / PAGE).read_bytes()
-    replace_file(store.layout.report_page(night.batch_date), page)
+    page = store.layout.report_page(night.batch_date)
+    replace_file(page, (store.path(made.ref) / PAGE).read_bytes())
+    place_scorecard(store.path(made.ref), page.parent)
     return conclude(made)

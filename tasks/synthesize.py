@@ -15,11 +15,11 @@ from ses_core.synthesis_settings import SynthesisSettings
 from storage.artifact_store import LocalArtifactStore
 from storage.environment_files import (
     ENVIRONMENTS_FILE,
+    SYNTHESIS_FILE,
     read_environments,
     write_environments,
 )
 from storage.materialize import Materialized, materialize
-from storage.night_contents import SYNTHESIS_FILE
 from storage.night_report import SynthesisUse
 from storage.selection_files import POOL_FOLDER, domain_digest, read_pool
 from storage.stage_records import write_record

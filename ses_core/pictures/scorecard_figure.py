@@ -8,8 +8,8 @@ from matplotlib.lines import Line2D
 
 from ses_core.arrays import FloatArray
 from ses_core.pictures.figures import LIGHT, Theme, new_figure, png_bytes, style_axes
+from ses_core.scorecard.result import Measured
 from ses_core.scorecard.rows import ScorecardRow
-from ses_core.scorecard.scorecard import Measured
 
 _ACROSS = 5
 _STEPS = 24

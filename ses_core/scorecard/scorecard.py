@@ -1,11 +1,11 @@
 """The scorecard: every way in which synthesized environments may fail to stand for real ones."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ses_core.arrays import BoolArray, FloatArray
+from ses_core.arrays import BoolArray
 from ses_core.protocols import Policy
 from ses_core.robot_profile import RobotProfile
 from ses_core.scorecard.copy_rows import copy_rows
@@ -18,28 +18,11 @@ from ses_core.scorecard.measures import (
     path_measures,
     shape_measures,
 )
-from ses_core.scorecard.rows import ScorecardRow
+from ses_core.scorecard.result import Measured, Scorecard
 from ses_core.scorecard.sample_rows import sample_rows
 from ses_core.scorecard.sampled import sample_both
 from ses_core.scorecard_settings import ScorecardSettings
 from ses_core.settings import SimulationSettings
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
-    """One measure of the real (N,) and the synthesized (M,) environments; nan where unknown."""
-
-    unit: str
-    real: FloatArray
-    synthesized: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scorecard:
-    """Rows, and the distributions behind those that compare measures, by the measure's name."""
-
-    rows: tuple[ScorecardRow, ...]
-    measures: Mapping[str, Measured]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -38,6 +38,11 @@ environments = 4
 least_pool = 1
 synthesizer = { method = "rs" }
 
+[scorecard]
+halvings = 4
+permutations = 19
+driven = 2
+
 [training]
 steps = 400
 parallel_envs = 8
@@ -115,6 +120,25 @@ def test_a_night_goes_from_bags_to_a_judged_policy_and_a_page(
     assert "http://" not in page.replace("http://www.w3.org", "")
 
 
+def test_a_night_says_how_well_its_environments_stand_for_the_pool(
+    fleet: Fleet, first: dict[str, Any]
+) -> None:
+    rows = {row["metric"]: row for row in first["scorecard"]}
+    assert rows["traversable, shipped"]["value"] == 1.0
+    assert rows["traversable, raw"]["value"] <= 1.0
+    assert rows["mean time"]["feature"] == "drives of dwa-slow"
+    assert rows["mean time"]["value"] > 0.0
+    assert all(row["note"] for row in first["scorecard"] if row["value"] is None)
+    report = Path(first["report"])
+    table = pd.read_parquet(report.parent / "scorecard.parquet")
+    assert table.metric.to_list() == [row["metric"] for row in first["scorecard"]]
+    pool = (read_tables(fleet.root)["selections"].run_id == first["run_id"]).sum()
+    assert table.set_index("metric").loc["traversable, shipped", "n_real"] == pool
+    page = report.read_text(encoding="utf-8")
+    assert "Do these environments stand for those?" in page
+    assert page.count('<tr class="group">') == 5
+
+
 def test_the_nights_rows_stand_in_every_table(fleet: Fleet, first: dict[str, Any]) -> None:
     tables = read_tables(fleet.root)
     assert len(tables["logs"]) == 8
@@ -174,7 +198,15 @@ def test_a_second_night_builds_nothing_and_says_the_same(
     second = fleet.night()
     assert built(second) == {}
     assert second["logs"]["known"] == 8
-    for key in ("run_id", "scenarios", "environments", "evaluation", "decision", "policy"):
+    for key in (
+        "run_id",
+        "scenarios",
+        "environments",
+        "scorecard",
+        "evaluation",
+        "decision",
+        "policy",
+    ):
         assert second[key] == first[key]
     assert {path: path.stat().st_mtime_ns for path in fleet.root.glob("batches/*")} == before
 

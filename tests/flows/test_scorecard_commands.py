@@ -70,6 +70,9 @@ def test_rows_are_answered_and_written_with_a_picture(folder: Path, tmp_path: Pa
     assert by_metric["mean time"]["n_synthesized"] == 3
     assert by_metric["mean time"]["n_real"] == 6
     assert by_metric["coverage"]["halves"] == "by environment (24)"
+    page = (tmp_path / "out" / "scorecard.html").read_text(encoding="utf-8")
+    assert "Do these environments stand for those?" in page
+    assert page.count('<tr class="group">') == 5
     assert Image.open(tmp_path / "out" / "scorecard.png").size[0] > 1000
 
 

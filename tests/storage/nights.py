@@ -8,6 +8,8 @@ from ses_core.evaluation.statistics import PolicySummary
 from ses_core.extraction.funnel import FunnelStep
 from ses_core.learning.training_curve import CurvePoint
 from ses_core.robot_profile import JACKAL
+from ses_core.scorecard.result import Measured, Scorecard
+from ses_core.scorecard.rows import Aim, ScorecardRow
 from storage.night_report import (
     Decision,
     EvaluationUse,
@@ -63,6 +65,7 @@ def full_night() -> NightReport:
             notes=("99 principal components instead of 100",),
         ),
         synthesized=environments(100, origin="s"),
+        scorecard=scorecard(),
         training=TrainingUse(
             policy="night-1f2e3d",
             parent="original",
@@ -197,6 +200,63 @@ def environments(
             is_chosen=chosen is None or index < chosen,
         )
         for index, place in enumerate(cells)
+    )
+
+
+def scorecard() -> Scorecard:
+    """A scorecard of a row of each group, one without a value."""
+    rng = np.random.default_rng(3)
+    return Scorecard(
+        rows=(
+            score_row("traversable, raw", value=0.763, low=None, high=None),
+            score_row("traversable, shipped", value=1.0, low=0.96, high=1.0),
+            score_row("precision", value=0.412, low=0.38, high=0.45),
+            score_row("copies", aim="low", value=0.02, low=0.0, high=0.05),
+            score_row(
+                "Wasserstein-1 visibility",
+                unit="m",
+                aim="low",
+                value=None,
+                note="too few: n=3 real and 9 synthesized",
+            ),
+            score_row("mean visibility", unit="m", aim="as real", value=0.65),
+            score_row("mean time", unit="s", aim="as real", value=31.2, low=28.0, high=36.0),
+        ),
+        measures={
+            "visibility": Measured(
+                unit="m", real=rng.normal(2.0, 0.3, 40), synthesized=rng.normal(2.2, 0.3, 30)
+            )
+        },
+    )
+
+
+def score_row(
+    metric: str,
+    *,
+    unit: str = "share",
+    aim: Aim = "high",
+    value: float | None,
+    low: float | None = None,
+    high: float | None = None,
+    real: tuple[float, float, float] | None = (0.55, 0.62, 0.70),
+    note: str = "",
+) -> ScorecardRow:
+    """Make a row whose real-against-real value and interval are `real`: low, value, high."""
+    return ScorecardRow(
+        metric=metric,
+        feature="cells (Hamming), k=5",
+        unit=unit,
+        aim=aim,
+        value=value,
+        low=low,
+        high=high,
+        real_value=real[1] if real else None,
+        real_low=real[0] if real else None,
+        real_high=real[2] if real else None,
+        n_real=30,
+        n_synthesized=30,
+        halves="by site (6)",
+        note=note,
     )
 
 

@@ -4,21 +4,26 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ses_core.errors import SchemaError
+from ses_core.errors import ArtifactError, SchemaError
 from ses_core.navigation import NavigationDomain, NavigationEnvironment
 from ses_core.scorecard.rows import ScorecardRow
 from storage.artifact_store import LocalArtifactStore
 from storage.layout import Layout
 from storage.parquet_files import read_arrow, write_table
 from storage.scorecard_files import (
+    MEASURES_FILE,
     SCORECARD_FILE,
     group_environments,
+    place_scorecard,
     raw_traversable_share,
     read_scorecard,
+    read_scored,
     write_scorecard,
+    write_scored,
 )
 from storage.table_log import TableLog
 from storage.table_schemas import SCHEMA_VERSION, VERSION_KEY
+from tests.ses_core.scorecard.samples import pillars, score
 from tests.storage.sample_tables import commit_sample, sample_columns
 
 ROWS = [
@@ -85,6 +90,39 @@ def test_another_table_of_that_name_is_refused(tmp_path: Path) -> None:
     write_table(tmp_path / SCORECARD_FILE, "scenarios", sample_columns("scenarios"))
     with pytest.raises(SchemaError, match="is no scorecard table"):
         read_scorecard(tmp_path)
+
+
+def test_distributions_come_back_in_their_order_with_their_units(tmp_path: Path) -> None:
+    found = score(pillars(12, seed=0), pillars(6, seed=1))
+    for name in ("one", "two"):
+        write_scored(tmp_path / name, found)
+    again = read_scored(tmp_path / "one")
+    assert again.rows == found.rows
+    assert list(again.measures) == list(found.measures)
+    for name, measured in found.measures.items():
+        assert again.measures[name].unit == measured.unit
+        np.testing.assert_array_equal(again.measures[name].real, measured.real)
+        np.testing.assert_array_equal(again.measures[name].synthesized, measured.synthesized)
+    files = [(tmp_path / name / MEASURES_FILE).read_bytes() for name in ("one", "two")]
+    assert files[0] == files[1]
+
+
+def test_damaged_distributions_are_an_error_that_names_the_file(tmp_path: Path) -> None:
+    write_scored(tmp_path, score(pillars(3, seed=0), pillars(3, seed=1)))
+    for content in (b"", b"PK no more", (tmp_path / MEASURES_FILE).read_bytes()[:900]):
+        (tmp_path / MEASURES_FILE).write_bytes(content)
+        with pytest.raises(ArtifactError, match=r"measures\.npz holds no measures"):
+            read_scored(tmp_path)
+
+
+def test_a_folder_keeps_no_scorecard_of_an_earlier_night(tmp_path: Path) -> None:
+    source, empty, folder = (tmp_path / name for name in ("source", "empty", "folder"))
+    write_scorecard(source, ROWS)
+    place_scorecard(source, folder)
+    assert read_scorecard(folder) == ROWS
+    place_scorecard(empty, folder)
+    place_scorecard(empty, folder)
+    assert not list(folder.iterdir())
 
 
 def test_sites_and_logs_come_from_the_scenarios_beside(tmp_path: Path) -> None:

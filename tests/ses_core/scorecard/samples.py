@@ -6,8 +6,9 @@ from ses_core.arrays import BoolArray, IntArray
 from ses_core.learning.policies import FIXED_POLICIES
 from ses_core.robot_profile import JACKAL
 from ses_core.scorecard.halving import Grouping
+from ses_core.scorecard.result import Scorecard
 from ses_core.scorecard.rows import ScorecardRow
-from ses_core.scorecard.scorecard import Driver, Scorecard, score_environments
+from ses_core.scorecard.scorecard import Driver, score_environments
 from ses_core.scorecard_settings import ScorecardSettings
 from ses_core.settings import SimulationSettings
 
