@@ -34,6 +34,14 @@ def scorecard(
             callback=lambda path: path and existing_directory(path, "--synthesized"),
         ),
     ],
+    training: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder of those learned from, if the real ones were held out.",
+            callback=lambda path: path and existing_directory(path, "--training"),
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -58,7 +66,10 @@ def scorecard(
     check_policies(command, [policy], "--policy")
     from storage.environment_files import read_environments
 
-    for option, folder in (("--real", real), ("--synthesized", synthesized)):
+    folders = {"--real": real, "--synthesized": synthesized, "--training": training}
+    for option, folder in folders.items():
+        if folder is None:
+            continue
         with misuse(option):
             read_environments(folder)
     with embedded_server(command.root):
@@ -70,6 +81,7 @@ def scorecard(
             real=real,
             synthesized=synthesized,
             policy=policy,
+            training=training,
             out=out.absolute() if out else None,
             settings=settings,
         )

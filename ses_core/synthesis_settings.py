@@ -104,7 +104,7 @@ class AutoregressiveSettings(SettingsModel):
 
     method: Literal["autoregressive"] = "autoregressive"
     reach: int = Field(
-        10, ge=1, le=29, description="Rows before a cell, and columns beside it, that it depends on."
+        10, ge=1, le=29, description="Rows before a cell, and columns beside it, that it sees."
     )
     hidden: int = Field(192, ge=8, description="Units of both hidden layers.")
     updates: int = Field(6000, ge=1, description="Steps of the optimiser.")
@@ -122,7 +122,7 @@ class AutoregressiveSettings(SettingsModel):
         0.995, ge=0, lt=1, description="Decay per update of the running average that is kept."
     )
     temperature: float = Field(
-        1.0, gt=0, description="Below 1 what is likely becomes likelier: less speckle, less variety."
+        1.0, gt=0, description="Below 1 what is likely becomes likelier, and variety is lost."
     )
     keeps_way_open: bool = Field(
         True,

@@ -5,6 +5,7 @@ from pathlib import Path
 from prefect import task
 from prefect.cache_policies import NO_CACHE
 
+from ses_core.arrays import BoolArray
 from ses_core.navigation import NavigationDomain
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, digest_json, settings_json
 from ses_core.scorecard.halving import Grouping, coarsest_grouping
@@ -87,6 +88,7 @@ def score_folders(
     out: Path | None,
     root: Path,
     settings: Settings,
+    training: Path | None = None,
 ) -> tuple[ScorecardRow, ...]:
     """Compare a folder of synthesized environments with a folder of real ones.
 
@@ -97,6 +99,7 @@ def score_folders(
         out: Folder for table, page and picture, if they are wanted.
         root: Folder of the store, in which policies, sites and logs are looked up.
         settings: Those of `scorecard` and `simulation` and the target robot matter.
+        training: Folder of what was learned from, where the real ones were held out.
 
     Raises:
         ArtifactError: A folder holds no environments.
@@ -104,7 +107,9 @@ def score_folders(
     """
     recorded, layout = read_environments(real), Layout(root)
     groups = group_environments(real, recorded, layout)
-    found = _score(recorded, synthesized, groups, find_policy(policy, layout), settings)
+    learned_from = read_environments(training).cells() if training else None
+    driver = find_policy(policy, layout)
+    found = _score(recorded, synthesized, groups, driver, settings, learned_from)
     if out is not None:
         # matplotlib takes half a second to import: only who draws pays for it.
         from ses_core.pictures.scorecard_figure import draw_scorecard
@@ -131,6 +136,7 @@ def _score(
     groups: Grouping,
     driver: NamedPolicy,
     settings: Settings,
+    training: BoolArray | None = None,
 ) -> Scorecard:
     """Score a folder of synthesized environments, with progress."""
     return score_environments(
@@ -140,6 +146,7 @@ def _score(
         settings=settings.scorecard,
         target=settings.target_robot,
         driver=Driver(name=driver.name, policy=driver.policy, simulation=settings.simulation),
+        training=training,
         raw_traversable=raw_traversable_share(synthesized),
         progress=report_progress("scorecard"),
     )

@@ -98,6 +98,35 @@ def memorisation(
         mirrored_too=mirrored_too,
     )
     real = nearest_of_other_groups(training, grouping, mirrored_too=mirrored_too)
+    return _compared(synthesized, real, rng)
+
+
+def memorisation_beside_heldout(
+    cells: BoolArray,
+    training: BoolArray,
+    heldout: BoolArray,
+    *,
+    mirrored_too: bool,
+    rng: Generator,
+) -> Memorisation:
+    """Test whether environments are nearer to the training ones than held-out real ones are.
+
+    Args:
+        cells: (M, 30, 30) synthesized environments, M >= 1.
+        training: (T, 30, 30) real ones that were learned from.
+        heldout: (N, 30, 30) real ones of other sites, N >= 1.
+        mirrored_too: Mirror images count as well.
+        rng: Source of chance.
+    """
+    return _compared(
+        nearest_training(cells, training, mirrored_too=mirrored_too),
+        nearest_training(heldout, training, mirrored_too=mirrored_too),
+        rng,
+    )
+
+
+def _compared(synthesized: FloatArray, real: FloatArray, rng: Generator) -> Memorisation:
+    """Compare the distances (M,) of synthesized ones with those (N,) of real ones."""
     test = mannwhitneyu(synthesized, real, alternative="less")
     resampled = [
         chance_nearer(rng.choice(synthesized, len(synthesized)), rng.choice(real, len(real)))

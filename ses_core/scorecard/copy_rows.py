@@ -8,6 +8,7 @@ from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.scorecard.copies import (
     Memorisation,
     memorisation,
+    memorisation_beside_heldout,
     near_duplicate_share,
     nearest_of_other_groups,
     nearest_training,
@@ -32,13 +33,17 @@ def copy_rows(
     *,
     settings: ScorecardSettings,
     rng: Generator,
+    training: BoolArray | None = None,
 ) -> list[ScorecardRow]:
-    """Look for copies, as they are and mirrored too."""
+    """Look for copies, as they are and mirrored too.
+
+    Without `training` the real environments are what was learned from; with it they are held out.
+    """
     rows = []
     for mirrored_too in (False, True):
         rows.append(_duplicate_row(sampled, mirrored_too, settings))
-        rows.append(_copy_row(real, synthesized, grouping, mirrored_too, settings))
-        rows.append(_memorisation_row(real, synthesized, grouping, mirrored_too, rng))
+        rows.append(_copy_row(real, synthesized, grouping, mirrored_too, settings, training))
+        rows.append(_memorisation_row(real, synthesized, grouping, mirrored_too, rng, training))
     return rows
 
 
@@ -81,14 +86,20 @@ def _copy_row(
     grouping: Grouping,
     mirrored_too: bool,
     settings: ScorecardSettings,
+    training: BoolArray | None,
 ) -> ScorecardRow:
     most = settings.copy_share * _AREA
-    ours = nearest_training(synthesized, real, mirrored_too=mirrored_too)
-    theirs = nearest_of_other_groups(real, grouping, mirrored_too=mirrored_too)
+    if training is None:
+        ours = nearest_training(synthesized, real, mirrored_too=mirrored_too)
+        theirs = nearest_of_other_groups(real, grouping, mirrored_too=mirrored_too)
+        whose = "a real one (real ones: from one of another group)"
+    else:
+        ours = nearest_training(synthesized, training, mirrored_too=mirrored_too)
+        theirs = nearest_training(real, training, mirrored_too=mirrored_too)
+        whose = "one that was learned from"
     return level_row(
         "copies",
-        f"{_named(mirrored_too)}, at most {most:g} cells from a real one "
-        "(real ones: from one of another group)",
+        f"{_named(mirrored_too)}, at most {most:g} cells from {whose}",
         "share",
         "low",
         np.where(np.isfinite(ours), ours <= most, np.nan),
@@ -105,13 +116,13 @@ def _memorisation_row(
     grouping: Grouping,
     mirrored_too: bool,
     rng: Generator,
+    training: BoolArray | None,
 ) -> ScorecardRow:
-    found: Memorisation | None = None
-    if grouping.count > 1 and len(synthesized) > 0:
-        found = memorisation(synthesized, real, grouping, mirrored_too=mirrored_too, rng=rng)
+    found = _memorisation(real, synthesized, grouping, mirrored_too, rng, training)
+    if found is not None:
         middle = np.median(found.synthesized), np.median(found.real)
         note = (
-            f"median to the nearest real one of other groups: {middle[0]:.4g} cells, "
+            f"median to the nearest one learned from, of other groups: {middle[0]:.4g} cells, "
             f"of real ones {middle[1]:.4g} cells"
         )
     else:
@@ -121,7 +132,8 @@ def _memorisation_row(
         )
     return ScorecardRow(
         metric="memorisation",
-        feature=f"{_named(mirrored_too)}, chance to be nearer to a real one than a real one is; "
+        feature=f"{_named(mirrored_too)}, chance to be nearer to those learned from than a real "
+        "one is; "
         "Mann-Whitney, one-sided",
         unit="chance",
         aim="as real",
@@ -135,3 +147,25 @@ def _memorisation_row(
         halves=grouping.named(),
         note=note,
     )
+
+
+def _memorisation(
+    real: BoolArray,
+    synthesized: BoolArray,
+    grouping: Grouping,
+    mirrored_too: bool,
+    rng: Generator,
+    training: BoolArray | None,
+) -> Memorisation | None:
+    """Compare nearness to what was learned from; None where there is too little of anything."""
+    if len(synthesized) == 0:
+        return None
+    if training is not None:
+        if len(training) == 0 or len(real) == 0:
+            return None
+        return memorisation_beside_heldout(
+            synthesized, training, real, mirrored_too=mirrored_too, rng=rng
+        )
+    if grouping.count < 2:
+        return None
+    return memorisation(synthesized, real, grouping, mirrored_too=mirrored_too, rng=rng)

@@ -42,18 +42,21 @@ def score_environments(
     settings: ScorecardSettings,
     target: RobotProfile,
     driver: Driver,
+    training: BoolArray | None = None,
     raw_traversable: float | None = None,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Scorecard:
     """Compare synthesized environments with real ones.
 
     Args:
-        real: (N, 30, 30) recorded environments, what was learned from.
+        real: (N, 30, 30) recorded environments: what was learned from, if no `training` is given,
+            else held-out ones of other sites.
         synthesized: (M, 30, 30).
         grouping: Which of the real ones belong together.
         settings: Sizes, seeds and thresholds.
         target: Robot that has to cross them.
         driver: Policy whose drives tell how hard they are.
+        training: (T, 30, 30) what was learned from, among which copies are looked for.
         raw_traversable: Share of all samples that could be crossed, where known.
         progress: Hears the share that is done, from 0 to 1.
     """
@@ -80,7 +83,9 @@ def score_environments(
             seed=settings.seed,
         ),
         *sample_rows(sampled, settings=settings, rng=rng),
-        *copy_rows(real, synthesized, grouping, sampled, settings=settings, rng=rng),
+        *copy_rows(
+            real, synthesized, grouping, sampled, settings=settings, rng=rng, training=training
+        ),
     ]
     places = shape_measures(sampled.maps.cells) | path_measures(
         sampled.maps.cells,

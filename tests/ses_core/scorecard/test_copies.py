@@ -14,8 +14,14 @@ REAL = pillars(60, seed=0, least=4)
 GROUPS = sites(*(6,) * 10)
 
 
-def copies_row(metric: str, made: BoolArray, *, mirrored_too: bool = False) -> ScorecardRow:
-    """Give a row about copies of `REAL`."""
+def copies_row(
+    metric: str,
+    made: BoolArray,
+    *,
+    mirrored_too: bool = False,
+    training: BoolArray | None = None,
+) -> ScorecardRow:
+    """Give a row about copies of `REAL`, or of `training` with `REAL` held out."""
     rows = copy_rows(
         REAL,
         made,
@@ -23,6 +29,7 @@ def copies_row(metric: str, made: BoolArray, *, mirrored_too: bool = False) -> S
         Sampled(maps=distinct_maps(np.concatenate((REAL, made))), grouping=GROUPS, splits=[]),
         settings=QUICK,
         rng=np.random.default_rng(0),
+        training=training,
     )
     return [row for row in rows if row.metric == metric][mirrored_too]
 
@@ -50,6 +57,19 @@ def test_mirrored_copies_are_flagged_only_where_mirror_images_count() -> None:
     assert (copies_row("copies", made).value or 0.0) < 0.2
     assert copies_row("copies", made, mirrored_too=True).value == 1.0
     assert (copies_row("memorisation", made, mirrored_too=True).p_value or 1.0) < 1e-6
+
+
+def test_beside_held_out_places_copies_are_looked_for_among_what_was_learned_from() -> None:
+    training = pillars(50, seed=7, least=4)
+    of_training = copies_row("copies", slightly_changed(training[:40]), training=training)
+    assert (of_training.value, of_training.n_real) == (1.0, len(REAL))
+    assert (of_training.real_value or 0.0) < 0.1
+    of_heldout = copies_row("copies", slightly_changed(REAL[:40]), training=training)
+    assert (of_heldout.value or 0.0) < 0.1
+    memorised = copies_row("memorisation", training[:40], training=training)
+    assert (memorised.value or 0.0) > 0.9
+    fresh = copies_row("memorisation", pillars(40, seed=9, least=4), training=training)
+    assert 0.3 < (fresh.value or 0.0) < 0.7
 
 
 @pytest.mark.parametrize("mirrored_too", [False, True])
