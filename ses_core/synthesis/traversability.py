@@ -47,13 +47,31 @@ def traversable(cells: BoolArray, *, radius: float) -> BoolArray:
     Raises:
         ValueError: The cells are no stack of environments, or the radius is out of range.
     """
+    radius_cells = radius_in_cells(radius)
+    check_stack(cells)
+    answers = np.zeros(len(cells), dtype=np.bool_)
+    _decide(np.ascontiguousarray(cells, dtype=np.bool_), radius_cells, answers)
+    return answers
+
+
+def radius_in_cells(radius: float) -> float:
+    """Give a disc's radius in cells: squares less than twice this apart close a gap.
+
+    Raises:
+        ValueError: The radius [m] is out of range.
+    """
     _check_radius(radius)
+    return radius / ENVIRONMENT_RESOLUTION_M - _EPSILON
+
+
+def check_stack(cells: BoolArray) -> None:
+    """Refuse what is no stack of environments (N, 30, 30).
+
+    Raises:
+        ValueError: The shape is another.
+    """
     if cells.ndim != 3 or cells.shape[1:] != (ENVIRONMENT_CELLS, ENVIRONMENT_CELLS):
         raise ValueError(f"environments have shape {cells.shape}, expected (N, 30, 30)")
-    answers = np.zeros(len(cells), dtype=np.bool_)
-    stack = np.ascontiguousarray(cells, dtype=np.bool_)
-    _decide(stack, radius / ENVIRONMENT_RESOLUTION_M - _EPSILON, answers)
-    return answers
 
 
 @compiled
