@@ -4,12 +4,13 @@ An environment cannot be crossed where squares less than a diameter apart are ch
 left side to the right one, or lie on the start or the goal (`traversability`). What lies on an
 end has to go. Of the rest, enough has to go that no chain is left: a smallest vertex cut
 between the sides in the graph whose edges join squares less than a diameter apart. By Menger's
-theorem its size is the largest number of chains that share no square, which augmenting paths
-find (Ford and Fulkerson; shortest paths first, as in Edmonds and Karp). The number of cleared
-cells is therefore the least possible, not an estimate of it.
+theorem its size is the largest number of chains that share no square, and augmenting paths
+find both (Ford and Fulkerson 1956). The number of cleared cells is therefore the least
+possible, not an estimate of it.
 
 Of several such cuts the one is taken that leaves room for the widest disc, up to
-`RADIUS_LIMIT_M`; of these the one nearest to the line from start to goal.
+`RADIUS_LIMIT_M`; of these the one nearest to the line from start to goal, and of these the
+one farthest to the left.
 """
 
 from typing import NamedTuple
@@ -49,7 +50,7 @@ class _Network(NamedTuple):
         flow: (S, K) from a square over each of its steps.
         parents: (2 S,) the node that a search came from.
         ways: (2 S,) the step that it came over.
-        queue: (2 S,) nodes in the order they were reached.
+        waiting: (2 S,) nodes that a search has reached and not yet gone on from.
     """
 
     steps: IntArray
@@ -60,7 +61,7 @@ class _Network(NamedTuple):
     flow: IntArray
     parents: IntArray
     ways: IntArray
-    queue: IntArray
+    waiting: IntArray
 
 
 def repair(cells: BoolArray, *, radius: float, most: int) -> tuple[BoolArray, IntArray]:
@@ -93,14 +94,16 @@ def repair(cells: BoolArray, *, radius: float, most: int) -> tuple[BoolArray, In
 def _empty_network() -> _Network:
     """Lay out room for any environment.
 
-    Steps count in an environment flattened with its margin; those over the least gaps are first.
+    Steps count in an environment flattened with its margin. Those over the least gaps are first,
+    and of equal ones those to the left: a search tries the last one first.
     """
     offsets = np.arange(-_REACH, _REACH + 1)
     between = np.maximum(np.abs(offsets) - 1, 0)
     gaps = between[:, None] ** 2 + between[None, :] ** 2
     steps = offsets[:, None] * _WIDTH + offsets[None, :]
     is_near = (gaps < _REACH**2) & (steps != 0)
-    order = np.argsort(gaps[is_near], kind="stable")
+    across = np.broadcast_to(offsets, steps.shape)[is_near]
+    order = np.lexsort((across, gaps[is_near]))
     squares = _WIDTH * _WIDTH
     return _Network(
         steps=steps[is_near][order],
@@ -111,7 +114,7 @@ def _empty_network() -> _Network:
         flow=np.zeros((squares, len(order)), dtype=np.int64),
         parents=np.empty(2 * squares, dtype=np.int64),
         ways=np.empty(2 * squares, dtype=np.int64),
-        queue=np.empty(2 * squares, dtype=np.int64),
+        waiting=np.empty(2 * squares, dtype=np.int64),
     )
 
 
@@ -166,7 +169,7 @@ def _lay_out(cells: BoolArray, ends: BoolArray, net: _Network) -> int:
 
 @compiled_in_place
 def _find_chain(net: _Network, closed: int) -> int:
-    """Search breadth first for a way that more can flow on, from the left side to the right.
+    """Search depth first for a way that more can flow on, from the left side to the right.
 
     Square s has an entry 2 s and an exit 2 s + 1; between them flows at most its capacity,
     between squares whose squared gap is at most `closed` any amount.
@@ -182,18 +185,17 @@ def _find_chain(net: _Network, closed: int) -> int:
             square = (row + _REACH) * _WIDTH + column + _REACH
             if column * column <= closed and net.occupied[square]:
                 net.parents[2 * square] = _FROM_SIDE
-                net.queue[count] = 2 * square
+                net.waiting[count] = 2 * square
                 count += 1
-    done = 0
-    while done < count:
-        node = net.queue[done]
-        done += 1
+    while count > 0:
+        count -= 1
+        node = net.waiting[count]
         square, is_exit = node >> 1, node & 1
         # Through the square itself: onwards what is left of its capacity, back what flows.
         room = net.through[square] if is_exit else net.capacity[square] - net.through[square]
         if room > 0 and net.parents[node ^ 1] == _UNSEEN:
             net.parents[node ^ 1] = node
-            net.queue[count] = node ^ 1
+            net.waiting[count] = node ^ 1
             count += 1
         if is_exit:
             to_side = ENVIRONMENT_CELLS - 1 - (square % _WIDTH - _REACH)
@@ -209,7 +211,7 @@ def _find_chain(net: _Network, closed: int) -> int:
             if is_exit or net.flow[other, way] > 0:
                 net.parents[target] = node
                 net.ways[target] = way
-                net.queue[count] = target
+                net.waiting[count] = target
                 count += 1
     return _UNSEEN
 
