@@ -47,6 +47,11 @@ class GeneratorNetwork:
     bias: Float32Array
     leaky_slope: float
 
+    @property
+    def is_endless(self) -> bool:
+        """Every draw is from new noise."""
+        return True
+
     def sample(self, count: int, *, rng: Generator) -> BoolArray:
         """Draw noise from N(0, 1) and binarize what comes out at a threshold of 0."""
         latent_size = self.hidden[0].weight.shape[0]

@@ -17,6 +17,11 @@ class FittedIdentity:
 
     cells: BoolArray
 
+    @property
+    def is_endless(self) -> bool:
+        """There are as many as were recorded."""
+        return False
+
     def sample(
         self,
         count: int,

@@ -39,6 +39,11 @@ class FittedPcaKmeans:
     coordinates: FloatArray
     clusters: IntArray
 
+    @property
+    def is_endless(self) -> bool:
+        """There are as many as were recorded."""
+        return False
+
     def sample(self, count: int, *, rng: Generator) -> BoolArray:
         """Draw from every cluster in turn, without replacement, and reconstruct.
 

@@ -17,6 +17,11 @@ class FittedRandomSampling:
 
     cells: BoolArray
 
+    @property
+    def is_endless(self) -> bool:
+        """There are as many as were recorded."""
+        return False
+
     def sample(self, count: int, *, rng: Generator) -> BoolArray:
         """Draw without replacement; fewer than `count` where there are no more."""
         return self.cells[rng.permutation(len(self.cells))[:count]]
