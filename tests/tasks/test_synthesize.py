@@ -78,6 +78,9 @@ def test_an_unchanged_pool_is_never_fitted_again(store: LocalArtifactStore) -> N
     assert not warm.found
     again = fit(store, more, WARM)
     assert (again.found, again.ref) == (True, warm.ref)
+    # The fit of the larger pool is newer now, and no reason to go on from it.
+    again = fit(store, pool, WARM)
+    assert (again.found, again.ref) == (True, first.ref)
 
 
 def test_a_warm_start_goes_on_from_the_newest_earlier_fit(store: LocalArtifactStore) -> None:
