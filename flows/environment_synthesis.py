@@ -26,6 +26,9 @@ class SynthesisSummary(BaseModel):
     rejected_share: float
     repeated: int
     copied: int
+    repaired: int
+    repaired_cells: float
+    beyond_repair: int
     notes: tuple[str, ...]
     out: str
 
@@ -81,6 +84,9 @@ def synthesize(
         rejected_share=used.rejected_share,
         repeated=used.repeated,
         copied=used.copied,
+        repaired=used.repaired,
+        repaired_cells=used.repaired_cells,
+        beyond_repair=used.beyond_repair,
         notes=used.notes,
         out=str(out),
     )

@@ -31,10 +31,22 @@ class LogReader(Protocol):
 class FittedSynthesizer(Protocol):
     """Draws environments like those it was fitted to."""
 
-    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+    @property
+    def is_endless(self) -> bool:
+        """Whether asking again brings new samples; else `sample` begins again with the same ones.
+
+        What is not endless is asked once, for as many as could be needed.
+        """
+        ...
+
+    def sample(self, count: int, *, rng: Generator, radius: float | None = None) -> BoolArray:
         """Draw cells (count or fewer, 30, 30), fewer where there are no more distinct ones.
 
-        Whether they can be crossed is checked by the caller.
+        Args:
+            count: How many are wanted.
+            rng: Source of chance.
+            radius: Of the disc [m] that is to get across, for methods that can see to that. The
+                caller checks all the same.
         """
         ...
 
@@ -61,7 +73,8 @@ class Synthesizer(Protocol):
             rng: Source of chance.
             progress: Hears the share that is done, from 0 to 1.
             start: Earlier fit of the same method to go on from (a warm start); methods whose
-                fit has no beginning pay it no heed.
+                fit has no beginning pay it no heed. Where its arrays have other shapes than
+                those of this fit, the caller fits again without it.
         """
         ...
 

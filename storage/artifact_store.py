@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ses_core.errors import ArtifactError
-from ses_core.recipes import ArtifactRef, JsonValue, Recipe, parse_ref
+from ses_core.recipes import ArtifactRef, JsonValue, Recipe, Stage, parse_ref
 from storage.durable_files import (
     MACHINE_FAULTS,
     disk_errors,
@@ -146,6 +146,18 @@ class LocalArtifactStore:
             return read_answer(self._recipe_path(recipe))
         except ArtifactError:
             return None
+
+    def answers(self, stage: Stage) -> list[Answer]:
+        """List how recipes of a stage, in its present version, were answered, newest first.
+
+        Damaged recipe files are left out; whether the artifacts are still there is not looked at.
+        """
+        found: list[Answer] = []
+        for path in self._layout.recipe_file(stage.name, "any").parent.glob("*.json"):
+            with suppress(ArtifactError):
+                found.append(read_answer(path))
+        found = [answer for answer in found if answer.recipe["version"] == stage.version]
+        return sorted(found, key=lambda one: (one.created_stamp_ns, one.ref), reverse=True)
 
     def forget(self, recipe: Recipe) -> None:
         """Drop the answer to a recipe, so that it is built again; its artifact stays."""

@@ -116,6 +116,9 @@ class SynthesisUse:
     rejected_share: float
     repeated: int
     copied: int
+    repaired: int = 0
+    repaired_cells: float = 0.0
+    beyond_repair: int = 0
     notes: tuple[str, ...] = ()
 
 

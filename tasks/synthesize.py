@@ -10,9 +10,10 @@ from prefect.cache_policies import NO_CACHE
 
 from ses_core.recipes import ArtifactRef, Recipe, settings_json
 from ses_core.robot_profile import RobotProfile
-from ses_core.synthesis.synthesize import draw_environments, fit_synthesis
+from ses_core.synthesis.synthesize import can_go_on, draw_environments, fit_synthesis
 from ses_core.synthesis_settings import SynthesisSettings
 from storage.artifact_store import LocalArtifactStore
+from storage.earlier_fits import earlier_fit, go_on
 from storage.environment_files import (
     ENVIRONMENTS_FILE,
     SYNTHESIS_FILE,
@@ -51,7 +52,11 @@ def fit_synthesizer(
     settings: SynthesisSettings,
     anew: bool = False,
 ) -> Materialized:
-    """Learn what the challenging environments look like; anew only when their set changed."""
+    """Learn what the challenging environments look like; anew only when their set changed.
+
+    A warm start goes on from the newest fit of the same synthesizer to other environments; that
+    fit is an input of the recipe, so a warm fit never answers for one from nothing.
+    """
     pool = read_pool(store.path(selection))
     recipe = Recipe(
         FIT,
@@ -62,12 +67,16 @@ def fit_synthesizer(
             "seed": settings.seed,
         },
     )
+    if settings.warm_start and can_go_on(settings, available=len(pool.environments)):
+        recipe = go_on(recipe, store=store, anew=anew)
 
     def build(directory: Path) -> None:
         rng = np.random.default_rng([settings.seed, 0])
         progress = report_progress("synthesize")
+        start = earlier_fit(recipe, store=store)
         write_synthesizer(
-            directory, fit_synthesis(pool, settings=settings, rng=rng, progress=progress)
+            directory,
+            fit_synthesis(pool, settings=settings, rng=rng, progress=progress, start=start),
         )
 
     return conclude(materialize(store, recipe, build, anew=anew))
@@ -91,6 +100,8 @@ def sample_environments(
             "pool": domain_digest(pool),
             "environments": settings.environments,
             "attempts": settings.attempts,
+            "uncrossable": settings.uncrossable,
+            "most_repaired_cells": settings.most_repaired_cells,
             "seed": settings.seed,
             "inscribed_radius_m": target.inscribed_radius_m,
         },
@@ -113,6 +124,9 @@ def sample_environments(
             rejected_share=result.rejected_share,
             repeated=result.repeated,
             copied=len(result.copies),
+            repaired=result.repaired,
+            repaired_cells=result.repaired_cells,
+            beyond_repair=result.beyond_repair,
             notes=result.notes,
         )
         write_record(directory / SYNTHESIS_FILE, asdict(used))

@@ -54,7 +54,12 @@ class AutoregressiveNetwork:
     temperature: float
     keeps_way_open: bool
 
-    def sample(self, count: int, *, rng: Generator, radius: float) -> BoolArray:
+    @property
+    def is_endless(self) -> bool:
+        """Every draw is from new chances."""
+        return True
+
+    def sample(self, count: int, *, rng: Generator, radius: float | None = None) -> BoolArray:
         """Draw environments, those of a batch side by side; see `FittedSynthesizer`."""
         side = ENVIRONMENT_CELLS
         cells = np.empty((count, side, side), dtype=np.bool_)
@@ -78,13 +83,13 @@ class AutoregressiveNetwork:
             "keeps_way_open": np.array(self.keeps_way_open),
         }
 
-    def _draw(self, uniform: Float32Array, radius: float) -> BoolArray:
+    def _draw(self, uniform: Float32Array, radius: float | None) -> BoolArray:
         """Turn uniform numbers (N, 30, 30) into cells (N, 30, 30), start edge first."""
         size, side, _ = uniform.shape
         reach, before = self.reach, len(self.window_weight) - self.reach
         signs = padded_signs(np.zeros((size, side, side), dtype=np.bool_), reach)
         signs[:, reach:, reach:-reach] = 0.0
-        way = OpenWay(size, radius=radius) if self.keeps_way_open else None
+        way = OpenWay(size, radius=radius) if self.keeps_way_open and radius else None
         place = self.place.reshape(side, side, -1)
         threshold = self.temperature * _logit(uniform)
         for row in range(side):

@@ -16,11 +16,17 @@ class FixedOrder:
 
     cells: BoolArray
 
+    @property
+    def is_endless(self) -> bool:
+        """There are as many as were recorded."""
+        return False
+
     def sample(
         self,
         count: int,
         *,
         rng: Generator,  # noqa: ARG002  (the seam's: the order is fixed)
+        radius: float | None = None,  # noqa: ARG002  (the seam's: the caller sees to it)
     ) -> BoolArray:
         """Give the first ones; fewer than `count` where there are no more."""
         return self.cells[:count].copy()

@@ -47,7 +47,18 @@ class GeneratorNetwork:
     bias: Float32Array
     leaky_slope: float
 
-    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+    @property
+    def is_endless(self) -> bool:
+        """Every draw is from new noise."""
+        return True
+
+    def sample(
+        self,
+        count: int,
+        *,
+        rng: Generator,
+        radius: float | None = None,  # noqa: ARG002  (the seam's: the caller sees to it)
+    ) -> BoolArray:
         """Draw noise from N(0, 1) and binarize what comes out at a threshold of 0."""
         latent_size = self.hidden[0].weight.shape[0]
         noise = rng.standard_normal((count, latent_size), dtype=np.float32)

@@ -27,7 +27,18 @@ class FittedMirror:
 
     cells: BoolArray
 
-    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+    @property
+    def is_endless(self) -> bool:
+        """There are as many as the recorded places give."""
+        return False
+
+    def sample(
+        self,
+        count: int,
+        *,
+        rng: Generator,
+        radius: float | None = None,  # noqa: ARG002  (the seam's: the caller sees to it)
+    ) -> BoolArray:
         """Draw without replacement; fewer than `count` where there are no more different ones."""
         courses = distinct_maps(four_courses(self.cells)).cells
         return courses[rng.permutation(len(courses))[:count]]

@@ -14,13 +14,11 @@ import numpy as np
 
 from ses_core.arrays import BoolArray, IntArray
 from ses_core.compilation import compiled
-from ses_core.occupancy import ENVIRONMENT_CELLS, ENVIRONMENT_RESOLUTION_M
-from ses_core.synthesis.traversability import check_radius
+from ses_core.occupancy import ENVIRONMENT_CELLS
+from ses_core.synthesis.traversability import radius_in_cells
 
 _CELLS = ENVIRONMENT_CELLS**2
 _LEFT, _RIGHT = _CELLS, _CELLS + 1  # the sides, as members of chains
-
-_EPSILON = 1e-9
 
 
 class OpenWay:
@@ -35,8 +33,7 @@ class OpenWay:
         Raises:
             ValueError: The radius is out of range.
         """
-        check_radius(radius)
-        self._radius = radius / ENVIRONMENT_RESOLUTION_M - _EPSILON
+        self._radius = radius_in_cells(radius)
         self._chains = np.tile(np.arange(_CELLS + 2), (count, 1))
         self._cells = np.zeros((count, ENVIRONMENT_CELLS, ENVIRONMENT_CELLS), dtype=np.bool_)
 

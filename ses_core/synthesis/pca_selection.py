@@ -24,7 +24,18 @@ class ClusterDraw:
     cells: BoolArray
     clusters: IntArray
 
-    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+    @property
+    def is_endless(self) -> bool:
+        """There are as many as the recorded places give."""
+        return False
+
+    def sample(
+        self,
+        count: int,
+        *,
+        rng: Generator,
+        radius: float | None = None,  # noqa: ARG002  (the seam's: the caller sees to it)
+    ) -> BoolArray:
         """Draw from every cluster in turn, without replacement.
 
         With m clusters the first m x n are n from each; a cluster that runs out is passed

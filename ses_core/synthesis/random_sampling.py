@@ -18,7 +18,18 @@ class FittedRandomSampling:
 
     cells: BoolArray
 
-    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+    @property
+    def is_endless(self) -> bool:
+        """There are as many as were recorded."""
+        return False
+
+    def sample(
+        self,
+        count: int,
+        *,
+        rng: Generator,
+        radius: float | None = None,  # noqa: ARG002  (the seam's: the caller sees to it)
+    ) -> BoolArray:
         """Draw without replacement; fewer than `count` where there are no more."""
         return self.cells[rng.permutation(len(self.cells))[:count]]
 

@@ -1,7 +1,8 @@
 """From challenging environments to the ones a policy trains in (section III-C)."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import copy
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -13,8 +14,16 @@ from ses_core.recipes import digest_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.synthesis.factory import make_synthesizer
 from ses_core.synthesis.sizes import SynthesisPlan, plan_synthesis
-from ses_core.synthesis.traversability import traversable
-from ses_core.synthesis_settings import SynthesisSettings
+from ses_core.synthesis.taking import Taking
+from ses_core.synthesis_settings import (
+    AutoregressiveSettings,
+    GanPaperSettings,
+    GanSettings,
+    SynthesisSettings,
+)
+
+_Trained = GanSettings | GanPaperSettings | AutoregressiveSettings
+"""Synthesizers whose fit is a training, which can begin where an earlier one ended."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +35,14 @@ class FittedSynthesis:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EarlierFit:
+    """A fit to go on from, and the name it goes by in the notes."""
+
+    name: str
+    fitted: FittedSynthesis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisResult:
     """p_SES, and what it took to get it.
 
@@ -34,8 +51,12 @@ class SynthesisResult:
         method_asked: The synthesizer of the settings.
         method_used: The synthesizer that made them; another one where `notes` say so.
         drawn: Samples looked at.
-        rejected_share: Share of them that the target robot cannot cross.
+        rejected_share: Share of them that the target robot cannot cross as they were drawn.
         repeated: Samples passed over because they equal one already taken.
+        repaired: Environments in which cells were cleared so that it can.
+        repaired_cells: Cells cleared in each of these, on average; 0 where there are none.
+        beyond_repair: Samples passed over because more cells would have had to be cleared than
+            the settings allow.
         copies: By environment, the scenario whose recorded place it equals cell by cell.
         notes: Where the result departs from what was asked, in words.
     """
@@ -46,6 +67,9 @@ class SynthesisResult:
     drawn: int
     rejected_share: float
     repeated: int
+    repaired: int
+    repaired_cells: float
+    beyond_repair: int
     copies: Mapping[str, str]
     notes: tuple[str, ...]
 
@@ -68,23 +92,48 @@ def synthesize(
     return draw_environments(fitted, domain, settings=settings, target=target, rng=sample_rng)
 
 
+def can_go_on(settings: SynthesisSettings, *, available: int) -> bool:
+    """Tell whether the fit to `available` environments can begin where an earlier one ended.
+
+    Raises:
+        SynthesisError: There is nothing to learn from.
+    """
+    return isinstance(plan_synthesis(settings, available=available).synthesizer, _Trained)
+
+
 def fit_synthesis(
     domain: NavigationDomain,
     *,
     settings: SynthesisSettings,
     rng: Generator,
     progress: Callable[[float], None],
+    start: EarlierFit | None = None,
 ) -> FittedSynthesis:
     """Fit the synthesizer that the settings and the size of the domain call for.
+
+    Where `start` is of another synthesizer or its arrays have other shapes, the fit begins
+    from nothing and is the same as without it. What was done is in the notes.
 
     Raises:
         SynthesisError: The domain is empty.
     """
     plan = plan_synthesis(settings, available=len(domain.environments))
     synthesizer = make_synthesizer(plan.synthesizer, environments=plan.environments)
-    return FittedSynthesis(
-        plan=plan, synthesizer=synthesizer.fit(domain, rng=rng, progress=progress)
-    )
+    note = ""
+    if start is not None:
+        if start.fitted.plan.synthesizer == plan.synthesizer:
+            earlier = start.fitted.synthesizer
+            went_on = synthesizer.fit(
+                domain, rng=copy.deepcopy(rng), progress=progress, start=earlier
+            )
+            # A synthesizer may take over only the arrays that fit: that is no going on.
+            if _shapes(went_on) == _shapes(earlier):
+                notes = (*plan.notes, f"went on from the earlier fit {start.name}")
+                return FittedSynthesis(plan=replace(plan, notes=notes), synthesizer=went_on)
+        note = f"began from nothing: the earlier fit {start.name} does not match"
+    fitted = synthesizer.fit(domain, rng=rng, progress=progress)
+    notes = (*plan.notes, note) if note else plan.notes
+    return FittedSynthesis(plan=replace(plan, notes=notes), synthesizer=fitted)
 
 
 def draw_environments(
@@ -97,64 +146,58 @@ def draw_environments(
 ) -> SynthesisResult:
     """Draw until enough distinct environments can be crossed, or the attempts are used up.
 
+    A sample that cannot be crossed is repaired or passed over (`SynthesisSettings.uncrossable`).
     Environments that equal one of the domain it was fitted to are counted and traced.
     """
     plan = fitted.plan
-    cells = fitted.synthesizer.sample(plan.environments * settings.attempts, rng=rng)
-    taken, drawn, crossable, repeated = _take(
-        cells, count=plan.environments, radius=target.inscribed_radius_m
-    )
+    taking = Taking(settings=settings, count=plan.environments, radius=target.inscribed_radius_m)
+    for samples in _samples(
+        fitted, attempts=settings.attempts, radius=target.inscribed_radius_m, rng=rng
+    ):
+        taking.look_at(samples)
+        if taking.is_complete:
+            break
     recorded = {
         environment.cells.tobytes(): environment.scenario_id
         for environment in reversed(domain.environments)
     }
     method = plan.synthesizer.method
-    environments = tuple(_environment(cells[index], method=method) for index in taken)
-    notes = list(plan.notes)
-    if len(taken) < plan.environments:
-        notes.append(
-            f"{len(taken)} environments instead of {plan.environments}: among {drawn} samples "
-            f"{crossable} can be crossed, {repeated} of these repeat another"
-        )
+    environments = tuple(_environment(cells, method=method) for cells in taking.taken)
     return SynthesisResult(
         environments=NavigationDomain(environments),
         method_asked=settings.synthesizer.method,
         method_used=method,
-        drawn=drawn,
-        rejected_share=(drawn - crossable) / drawn,
-        repeated=repeated,
+        drawn=taking.drawn,
+        rejected_share=(taking.drawn - taking.crossable) / taking.drawn,
+        repeated=taking.repeated,
+        repaired=len(taking.repairs),
+        repaired_cells=sum(taking.repairs) / max(len(taking.repairs), 1),
+        beyond_repair=taking.beyond_repair,
         copies={
             environment.environment_id: recorded[environment.cells.tobytes()]
             for environment in environments
             if environment.cells.tobytes() in recorded
         },
-        notes=tuple(notes),
+        notes=plan.notes if taking.is_complete else (*plan.notes, taking.shortage()),
     )
 
 
-def _take(cells: BoolArray, *, count: int, radius: float) -> tuple[list[int], int, int, int]:
-    """Look at samples (S, 30, 30) in order until `count` are taken.
-
-    Returns:
-        Which are taken; how many were looked at, can be crossed, and repeat one taken before.
-    """
-    taken: list[int] = []
-    seen: set[bytes] = set()
-    drawn = crossable = repeated = 0
+def _samples(
+    fitted: FittedSynthesis, *, attempts: int, radius: float, rng: Generator
+) -> Iterator[BoolArray]:
+    """Draw as many samples at a time as environments are wanted, at most `attempts` times."""
+    count = fitted.plan.environments
+    if fitted.synthesizer.is_endless:
+        for _ in range(attempts):
+            yield fitted.synthesizer.sample(count, rng=rng, radius=radius)
+        return
+    cells = fitted.synthesizer.sample(count * attempts, rng=rng, radius=radius)
     for first in range(0, len(cells), count):
-        chunk = cells[first : first + count]
-        for offset in np.flatnonzero(traversable(chunk, radius=radius)):
-            crossable += 1
-            key = chunk[offset].tobytes()
-            if key in seen:
-                repeated += 1
-                continue
-            seen.add(key)
-            taken.append(first + int(offset))
-            if len(taken) == count:
-                return taken, first + int(offset) + 1, crossable, repeated
-        drawn = first + len(chunk)
-    return taken, drawn, crossable, repeated
+        yield cells[first : first + count]
+
+
+def _shapes(fitted: FittedSynthesizer) -> dict[str, tuple[int, ...]]:
+    return {name: array.shape for name, array in fitted.arrays().items()}
 
 
 def _environment(cells: BoolArray, *, method: str) -> NavigationEnvironment:

@@ -47,13 +47,31 @@ def traversable(cells: BoolArray, *, radius: float) -> BoolArray:
     Raises:
         ValueError: The cells are no stack of environments, or the radius is out of range.
     """
-    check_radius(radius)
+    radius_cells = radius_in_cells(radius)
+    check_stack(cells)
+    answers = np.zeros(len(cells), dtype=np.bool_)
+    _decide(np.ascontiguousarray(cells, dtype=np.bool_), radius_cells, answers)
+    return answers
+
+
+def radius_in_cells(radius: float) -> float:
+    """Give a disc's radius in cells: squares less than twice this apart close a gap.
+
+    Raises:
+        ValueError: The radius [m] is out of range.
+    """
+    _check_radius(radius)
+    return radius / ENVIRONMENT_RESOLUTION_M - _EPSILON
+
+
+def check_stack(cells: BoolArray) -> None:
+    """Refuse what is no stack of environments (N, 30, 30).
+
+    Raises:
+        ValueError: The shape is another.
+    """
     if cells.ndim != 3 or cells.shape[1:] != (ENVIRONMENT_CELLS, ENVIRONMENT_CELLS):
         raise ValueError(f"environments have shape {cells.shape}, expected (N, 30, 30)")
-    answers = np.zeros(len(cells), dtype=np.bool_)
-    stack = np.ascontiguousarray(cells, dtype=np.bool_)
-    _decide(stack, radius / ENVIRONMENT_RESOLUTION_M - _EPSILON, answers)
-    return answers
 
 
 @compiled
@@ -130,7 +148,7 @@ def shortest_path(cells: BoolArray, radius: float) -> FloatArray | None:
 
 def path_through(course: OccupancyGrid, clearance: FloatArray, radius: float) -> FloatArray | None:
     """Find the shortest way through a course whose `node_clearance` is known already."""
-    check_radius(radius)
+    _check_radius(radius)
     free = clearance >= radius - _EPSILON
     spacing = course.resolution / NODES_PER_CELL
     start = np.rint((np.array([0.0, 0.0]) - course.origin) / spacing).astype(np.int64)
@@ -157,12 +175,7 @@ def node_clearance(course: OccupancyGrid) -> FloatArray:
     return distance * (course.resolution / NODES_PER_CELL)
 
 
-def check_radius(radius: float) -> None:
-    """Refuse a disc for which `traversable` would not be exact.
-
-    Raises:
-        ValueError: The radius [m] is out of range.
-    """
+def _check_radius(radius: float) -> None:
     if not 0.0 < radius < RADIUS_LIMIT_M:
         raise ValueError(
             f"robot has an inscribed radius of {radius:.3f} m, "

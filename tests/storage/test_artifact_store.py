@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ses_core.errors import ArtifactError
-from ses_core.recipes import ArtifactRef, Recipe
+from ses_core.recipes import ArtifactRef, Recipe, Stage
 from storage.artifact_store import LocalArtifactStore
 from storage.stages import EXTRACT, INGEST
 from tests.contracts.artifact_store import check_artifact_store
@@ -229,3 +229,21 @@ def _flip(path: Path, bit: int) -> None:
     content = bytearray(path.read_bytes())
     content[bit // 8] ^= 1 << bit % 8
     path.write_bytes(content)
+
+
+def test_answers_of_a_stage_are_listed_newest_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(range(1, 1000))
+    monkeypatch.setattr("storage.artifact_store.time.time_ns", lambda: next(clock))
+    store = LocalArtifactStore(tmp_path)
+    assert store.answers(INGEST) == []
+    recipes = [Recipe(INGEST, {"log": name}) for name in "cab"]
+    refs = [store.put(recipe, write(recipe.key().encode())) for recipe in recipes]
+    store.put(Recipe(EXTRACT, {"log": "a"}), write(b"other stage"))
+    outdated = Recipe(Stage(INGEST.name, INGEST.version + 1), {"log": "a"})
+    store.put(outdated, write(b"other version"))
+    store.layout.recipe_file(INGEST.name, recipes[1].key()).write_bytes(b"damaged")
+    listed = store.answers(INGEST)
+    assert [answer.ref for answer in listed] == [refs[2], refs[0]]
+    assert listed[0].recipe == recipes[2].as_json()

@@ -131,6 +131,8 @@ def test_page_says_what_was_refused_reused_and_decided(full_page: Page) -> None:
         "jackal-7 home-3 rosbag2 mcap 1 h 02 min 812 m 91 7",
         "second.mcap scan dropout: 3, pose jump: 1",
         "100 environments by pca (asked for: gan): 131 samples drawn, 23.7 % of them",
+        "2 passed over as repeats, 6 because a repair would change too many cells.",
+        "can be crossed: 23 were repaired, with 4.2 cells cleared on average. 5 equal",
         "99 principal components instead of 100",
         "Do these environments stand for those?",
         "76.3 % of all samples drawn can be crossed",

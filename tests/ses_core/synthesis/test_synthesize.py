@@ -39,7 +39,9 @@ def run(
 ) -> SynthesisResult:
     return synthesize(
         domain_of(cells),
-        settings=SynthesisSettings(synthesizer=synthesizer, environments=environments),
+        settings=SynthesisSettings(
+            synthesizer=synthesizer, environments=environments, uncrossable="reject"
+        ),
         target=JACKAL,
         rng=default_rng(seed),
         progress=lambda _: None,
@@ -148,7 +150,9 @@ def test_a_smaller_target_crosses_more() -> None:
     narrow[0, 14:16] = True
     narrow[0, 14:16, 14:16] = False
     domain = domain_of(narrow)
-    settings = SynthesisSettings(synthesizer=IdentitySettings(), environments=1)
+    settings = SynthesisSettings(
+        synthesizer=IdentitySettings(), environments=1, uncrossable="reject"
+    )
     shipped = [
         len(
             synthesize(
