@@ -133,6 +133,9 @@ class AutoregressiveSettings(SettingsModel):
     )
 
 
+LearnedSettings = GanPaperSettings | GanSettings | AutoregressiveSettings
+"""Generators: they make as many new environments as are asked for, and can go on from a fit."""
+
 SynthesizerSettings = Annotated[
     GanPaperSettings
     | GanSettings

@@ -26,10 +26,8 @@ from dataclasses import dataclass
 from ses_core.errors import SynthesisError
 from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.synthesis_settings import (
-    AutoregressiveSettings,
-    GanPaperSettings,
-    GanSettings,
     IdentitySettings,
+    LearnedSettings,
     MirrorSettings,
     PcaPaperSettings,
     PcaSettings,
@@ -39,9 +37,6 @@ from ses_core.synthesis_settings import (
 
 COURSES_PER_PLACE = 4
 """A place as it is, mirrored, the other way round, and both (`ses_core.synthesis.mirror`)."""
-
-_Learned = GanSettings | GanPaperSettings | AutoregressiveSettings
-"""What makes as many new environments as are asked for."""
 
 _Pca = PcaSettings | PcaPaperSettings
 
@@ -73,7 +68,7 @@ def plan_synthesis(settings: SynthesisSettings, *, available: int) -> SynthesisP
         )
     synthesizer, notes = _fitting_synthesizer(settings.synthesizer, available)
     environments = settings.environments
-    if not isinstance(synthesizer, _Learned):
+    if not isinstance(synthesizer, LearnedSettings):
         environments = min(environments, _most_environments(synthesizer, available))
     if environments < settings.environments:
         notes.append(
@@ -86,7 +81,7 @@ def plan_synthesis(settings: SynthesisSettings, *, available: int) -> SynthesisP
 def _fitting_synthesizer(
     asked: SynthesizerSettings, available: int
 ) -> tuple[SynthesizerSettings, list[str]]:
-    if isinstance(asked, _Learned) and available < asked.least_environments:
+    if isinstance(asked, LearnedSettings) and available < asked.least_environments:
         return MirrorSettings(), [_instead("mirror", asked, available, asked.least_environments)]
     if isinstance(asked, _Pca):
         if available == 1:

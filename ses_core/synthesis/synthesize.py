@@ -15,15 +15,7 @@ from ses_core.robot_profile import RobotProfile
 from ses_core.synthesis.factory import make_synthesizer
 from ses_core.synthesis.sizes import SynthesisPlan, plan_synthesis
 from ses_core.synthesis.taking import Taking
-from ses_core.synthesis_settings import (
-    AutoregressiveSettings,
-    GanPaperSettings,
-    GanSettings,
-    SynthesisSettings,
-)
-
-_Trained = GanSettings | GanPaperSettings | AutoregressiveSettings
-"""Synthesizers whose fit is a training, which can begin where an earlier one ended."""
+from ses_core.synthesis_settings import LearnedSettings, SynthesisSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +90,7 @@ def can_go_on(settings: SynthesisSettings, *, available: int) -> bool:
     Raises:
         SynthesisError: There is nothing to learn from.
     """
-    return isinstance(plan_synthesis(settings, available=available).synthesizer, _Trained)
+    return isinstance(plan_synthesis(settings, available=available).synthesizer, LearnedSettings)
 
 
 def fit_synthesis(

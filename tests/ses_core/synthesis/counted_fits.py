@@ -26,7 +26,7 @@ class CountedFit:
     def is_endless(self) -> bool:
         return True
 
-    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+    def sample(self, count: int, *, rng: Generator, radius: float | None = None) -> BoolArray:
         return rng.random((count, 30, 30)) < 0.01
 
     def arrays(self) -> Mapping[str, NDArray[np.generic]]:

@@ -82,6 +82,6 @@ QUICK_SYNTHESIZERS: tuple[SynthesizerSettings, ...] = (
     MedoidsSettings(),
     IdentitySettings(),
     MirrorSettings(),
-    AutoregressiveSettings(epochs=1),
+    AutoregressiveSettings(reach=3, hidden=16, updates=3),
 )
 """All nine, those that learn for a moment only: their samples are nothing to look at."""

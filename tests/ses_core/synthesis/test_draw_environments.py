@@ -44,7 +44,7 @@ class Source:
     is_endless: bool
     asked: list[int] = field(default_factory=list)
 
-    def sample(self, count: int, *, rng: Generator) -> BoolArray:
+    def sample(self, count: int, *, rng: Generator, radius: float | None = None) -> BoolArray:
         first = sum(self.asked) if self.is_endless else 0
         self.asked.append(count)
         return self.cells[first : first + count]
