@@ -23,7 +23,7 @@ def build_generator(settings: GanSettings) -> nn.Sequential:
     slope = settings.leaky_slope
     coarse, fine = settings.generator_channels
     hidden, spread = settings.generator_hidden, COARSE_SIDE**2 * coarse
-    return nn.Sequential(
+    generator = nn.Sequential(
         nn.Linear(settings.latent_size, hidden),
         nn.BatchNorm1d(hidden),
         nn.LeakyReLU(slope, inplace=True),
@@ -37,6 +37,18 @@ def build_generator(settings: GanSettings) -> nn.Sequential:
         nn.ConvTranspose2d(fine, 1, KERNEL, 2, upsampling_padding(2 * COARSE_SIDE), bias=False),
         PositionBias(),
     )
+    for module in generator:
+        if isinstance(module, nn.ConvTranspose2d):
+            _begin_smooth(module)
+    return generator
+
+
+def _begin_smooth(layer: nn.ConvTranspose2d) -> None:
+    """Begin with bilinear interpolation of randomly mixed channels: blobs, not a chessboard."""
+    ramp = torch.tensor([0.25, 0.75, 0.75, 0.25])
+    mixing = torch.randn(layer.in_channels, layer.out_channels) / layer.in_channels**0.5
+    with torch.no_grad():
+        layer.weight.copy_(mixing[:, :, None, None] * ramp[:, None] * ramp[None, :])
 
 
 def build_discriminator(settings: GanSettings) -> nn.Sequential:

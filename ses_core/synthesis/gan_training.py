@@ -1,7 +1,7 @@
 """The training of the mended GAN, pass by pass over the real environments."""
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 

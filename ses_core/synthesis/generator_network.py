@@ -126,9 +126,7 @@ def network_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> GeneratorN
     )
 
 
-def _layer(
-    weight: NDArray[np.generic], bias: NDArray[np.generic]
-) -> DenseLayer | UpsamplingLayer:
+def _layer(weight: NDArray[np.generic], bias: NDArray[np.generic]) -> DenseLayer | UpsamplingLayer:
     kind = DenseLayer if weight.ndim == 2 else UpsamplingLayer
     return kind(
         weight=np.asarray(weight, dtype=np.float32), bias=np.asarray(bias, dtype=np.float32)

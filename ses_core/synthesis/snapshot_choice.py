@@ -10,9 +10,7 @@ from ses_core.synthesis.generator_network import GeneratorNetwork
 from ses_core.synthesis_settings import GanSettings
 
 
-def held_out(
-    count: int, *, settings: GanSettings, rng: Generator
-) -> tuple[IntArray, IntArray]:
+def held_out(count: int, *, settings: GanSettings, rng: Generator) -> tuple[IntArray, IntArray]:
     """Draw which of `count` environments are trained on, and which are held out.
 
     Too few of them would tell nothing: then none is held out.

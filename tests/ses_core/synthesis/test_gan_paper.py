@@ -75,7 +75,8 @@ def test_halves_normalized_apart_cannot_be_told_apart_on_average() -> None:
         real, fake = 3.0 + torch.randn(32, 900), torch.randn(32, 900)
         means = {
             normalizes: [
-                half.mean().item() for half in judge(discriminator, real, fake, normalizes=normalizes)
+                half.mean().item()
+                for half in judge(discriminator, real, fake, normalizes=normalizes)
             ]
             for normalizes in ("together", "apart")
         }
