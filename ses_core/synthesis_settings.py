@@ -25,6 +25,11 @@ class GanPaperSettings(SettingsModel):
         description="The generator minimises log(1 - D(G(z))) as printed, which teaches it nothing "
         "once D is ahead, or -log D(G(z)).",
     )
+    discriminator_normalizes: Literal["together", "apart"] = Field(
+        "together",
+        description="Whether real and generated environments are one batch to the discriminator's "
+        "batch normalization. Apart, both get the same mean and the generator learns nothing.",
+    )
     least_updates: int = Field(
         2000, ge=1, description="Updates made even where the epochs would make fewer."
     )
@@ -38,13 +43,59 @@ class GanSettings(SettingsModel):
 
     method: Literal["gan"] = "gan"
     latent_size: int = Field(64, ge=1, description="Length of the noise vector.")
-    epochs: int = Field(200, ge=1, description="Passes over the challenging environments.")
-    batch_size: int = Field(64, ge=2, description="Environments per update.")
-    learning_rate: float = Field(2e-4, gt=0, description="Of both Adam optimisers.")
-    adam_beta1: float = Field(0.5, ge=0, lt=1, description="First-moment decay of both optimisers.")
+    generator_hidden: int = Field(256, ge=1, description="Units after the noise.")
+    generator_channels: tuple[int, int] = Field(
+        (32, 32), description="Channels of the generator's images of 8 x 8 and 16 x 16 cells."
+    )
+    discriminator_channels: tuple[int, int] = Field(
+        (16, 48), description="Channels of the discriminator's images of 16 x 16 and 8 x 8 cells."
+    )
+    discriminator_hidden: int = Field(128, ge=1, description="Units before its verdict.")
     leaky_slope: float = Field(0.2, gt=0, lt=1, description="Negative slope of the leaky ReLUs.")
+    epochs: int = Field(200, ge=1, description="Passes over the challenging environments, at most.")
     least_updates: int = Field(
         2000, ge=1, description="Updates made even where the epochs would make fewer."
+    )
+    batch_size: int = Field(64, ge=2, description="Environments per update.")
+    learning_rate: float = Field(5e-4, gt=0, description="Of both Adam optimisers.")
+    adam_beta1: float = Field(0.5, ge=0, lt=1, description="First-moment decay of both optimisers.")
+    r1_weight: float = Field(
+        1.0,
+        ge=0,
+        description="Weight of half the squared slope of the discriminator at real environments.",
+    )
+    r1_interval: int = Field(
+        16, ge=1, description="Updates of which one has it, so many times stronger."
+    )
+    average_decay: float = Field(
+        0.998,
+        ge=0,
+        lt=1,
+        description="Share of the running average of the generator's weights that an update keeps.",
+    )
+    mirrored: bool = Field(True, description="Real environments are mirrored at random.")
+    most_shift: int = Field(
+        2,
+        ge=0,
+        description="Cells by which all that the discriminator sees is shifted, up to, so that it "
+        "cannot learn the real ones by heart.",
+    )
+    heldout_share: float = Field(
+        0.1,
+        ge=0,
+        lt=1,
+        description="Share not trained on, by whose coverage the best generator is chosen.",
+    )
+    least_heldout: int = Field(
+        30, ge=2, description="With fewer than that none is held out and the last one is taken."
+    )
+    most_heldout: int = Field(500, ge=2, description="Most environments held out.")
+    snapshot_epochs: int = Field(10, ge=1, description="Epochs between two that are compared.")
+    coverage_neighbours: int = Field(
+        5, ge=1, description="A held-out one is covered within the distance of this neighbour."
+    )
+    patience: int = Field(
+        6, ge=1, description="So many compared in a row that are no better end the training."
     )
     least_environments: int = Field(
         30, ge=2, description="With fewer to learn from, mirror images are drawn instead."

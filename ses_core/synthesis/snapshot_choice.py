@@ -1,0 +1,87 @@
+"""Which state of a generator to keep: the one that covers held-out environments best."""
+
+import numpy as np
+from numpy.random import Generator
+
+from ses_core.arrays import BoolArray, IntArray
+from ses_core.scorecard.distances import clearance_feature, distinct_maps, euclidean
+from ses_core.scorecard.manifolds import manifold_scores
+from ses_core.synthesis.generator_network import GeneratorNetwork
+from ses_core.synthesis_settings import GanSettings
+
+
+def held_out(count: int, *, settings: GanSettings, rng: Generator) -> tuple[IntArray, IntArray]:
+    """Draw which of `count` environments are trained on, and which are held out.
+
+    Too few of them would tell nothing: then none is held out.
+    """
+    size = min(int(settings.heldout_share * count), settings.most_heldout)
+    if size < settings.least_heldout:
+        size = 0
+    order = rng.permutation(count)
+    return np.sort(order[size:]), np.sort(order[:size])
+
+
+class SnapshotChoice:
+    """Keeps the best of the generators it is shown; without anything held out, the last."""
+
+    def __init__(self, heldout: BoolArray, *, settings: GanSettings, rng: Generator) -> None:
+        """Take held-out environments (H, 30, 30)."""
+        self._heldout = heldout
+        self._settings = settings
+        self._noise_seed = int(rng.integers(2**63))
+        self._best: GeneratorNetwork | None = None
+        self._best_coverage = -1.0
+        self._worse_in_a_row = 0
+
+    @property
+    def best(self) -> GeneratorNetwork:
+        """The best one so far.
+
+        Raises:
+            ValueError: None was shown.
+        """
+        if self._best is None:
+            raise ValueError("found no generator to choose from, expected at least one")
+        return self._best
+
+    @property
+    def is_over(self) -> bool:
+        """Whether so many in a row were no better that more are not worth their time."""
+        return self._worse_in_a_row >= self._settings.patience
+
+    def consider(self, network: GeneratorNetwork) -> None:
+        """Look at one more; all are given the same noise, so that chance has less of a say."""
+        if len(self._heldout) == 0:
+            self._best = network
+            return
+        found = coverage(
+            self._heldout,
+            network.sample(len(self._heldout), rng=np.random.default_rng(self._noise_seed)),
+            k=self._settings.coverage_neighbours,
+        )
+        if found > self._best_coverage:
+            self._best, self._best_coverage, self._worse_in_a_row = network, found, 0
+        else:
+            self._worse_in_a_row += 1
+
+
+def coverage(heldout: BoolArray, generated: BoolArray, *, k: int) -> float:
+    """Give the share of the held-out with a generated one in the ball to their k-th nearest.
+
+    Distances are between clearances; ties are handled as on the scorecard. With k different
+    held-out environments or fewer there are no balls, and nothing is covered.
+
+    Args:
+        heldout: (H, 30, 30).
+        generated: (M, 30, 30).
+        k: Which nearest of the other held-out ones a ball reaches to.
+    """
+    maps = distinct_maps(np.concatenate((heldout, generated)))
+    scores = manifold_scores(
+        euclidean(clearance_feature(maps.cells)),
+        maps.index[: len(heldout)],
+        maps.index[len(heldout) :],
+        k=k,
+    )
+    return 0.0 if scores is None else scores.coverage
