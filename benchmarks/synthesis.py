@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import torch
 from _matrix_floor import Floor, Shape, products
-from ses_core.synthesis.repair import repair
 from torch import Tensor, nn
 
 from ses_core.arrays import BoolArray
@@ -25,6 +24,7 @@ from ses_core.robot_profile import JACKAL
 from ses_core.synthesis import gan_paper
 from ses_core.synthesis.factory import make_synthesizer
 from ses_core.synthesis.gan_training import GanTraining
+from ses_core.synthesis.repair import repair
 from ses_core.synthesis.seeded_torch import one_seeded_thread
 from ses_core.synthesis.snapshot_choice import SnapshotChoice
 from ses_core.synthesis_settings import (

@@ -46,9 +46,7 @@ def chances(network: AutoregressiveNetwork, cells: BoolArray) -> FloatArray:
     for row, column in itertools.product(range(30), range(30)):
         seen = []
         for r, c in [
-            *itertools.product(
-                range(row - reach, row), range(column - reach, column + reach + 1)
-            ),
+            *itertools.product(range(row - reach, row), range(column - reach, column + reach + 1)),
             *((row, c) for c in range(column - reach, column)),
         ]:
             seen.append(signs[r, c] if r >= 0 and 0 <= c < 30 else 0.0)
