@@ -155,10 +155,17 @@ class AutoregressiveSettings(SettingsModel):
 
     method: Literal["autoregressive"] = "autoregressive"
     reach: int = Field(
-        10, ge=1, le=29, description="Rows before a cell, and columns beside it, that it sees."
+        7,
+        ge=1,
+        le=29,
+        description="Rows before a cell, and columns beside it, that it sees. More fits the houses "
+        "better that were learned from, and others worse.",
     )
     hidden: int = Field(192, ge=8, description="Units of both hidden layers.")
-    updates: int = Field(6000, ge=1, description="Steps of the optimiser.")
+    dropout: float = Field(
+        0.3, ge=0, lt=1, description="Share of hidden units left out in each update."
+    )
+    updates: int = Field(3000, ge=1, description="Steps of the optimiser.")
     batch_size: int = Field(2048, ge=32, description="Cells per update.")
     learning_rate: float = Field(3e-3, gt=0, description="Of Adam at its highest.")
     weight_decay: float = Field(1e-3, ge=0, description="Per unit of the learning rate.")

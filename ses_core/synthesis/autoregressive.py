@@ -94,7 +94,7 @@ class Examples:
         )
 
     def draw(self, size: int, plain_share: float, rng: Generator) -> tuple[Tensor, ...]:
-        """Draw a batch: windows (B, W), places (B,), occupied or not (B,), weights (B,)."""
+        """Draw a batch: windows (B, W), rows, columns, occupied or not, and weights (B,)."""
         plain = round(plain_share * size) if len(self.plain) else 0
         chosen = np.concatenate(
             (
@@ -112,7 +112,8 @@ class Examples:
         inputs = window_size(self.windows.shape[3] - 1)
         return (
             torch.from_numpy(np.ascontiguousarray(flat[:, :inputs])),
-            torch.from_numpy(place),
+            torch.from_numpy(row),
+            torch.from_numpy(column),
             torch.from_numpy((flat[:, inputs] > 0.0).astype(np.float32)),
             torch.from_numpy(weights),
         )
@@ -136,19 +137,27 @@ class CausalNetwork(nn.Module):
     def __init__(self, settings: AutoregressiveSettings) -> None:
         super().__init__()
         inputs, hidden = window_size(settings.reach), settings.hidden
-        places = ENVIRONMENT_CELLS**2
+        side = ENVIRONMENT_CELLS
         self.window_weight = nn.Parameter(torch.randn(inputs, hidden) * math.sqrt(2.0 / inputs))
-        self.place = nn.Parameter(torch.zeros(places, hidden))
+        self.by_row = nn.Parameter(torch.zeros(side, hidden))
+        self.by_column = nn.Parameter(torch.zeros(side, hidden))
         self.hidden_weight = nn.Parameter(torch.randn(hidden, hidden) * math.sqrt(2.0 / hidden))
         self.hidden_bias = nn.Parameter(torch.zeros(hidden))
         self.output_weight = nn.Parameter(torch.zeros(hidden))
-        self.output_place = nn.Parameter(torch.zeros(places))
+        self.output_by_row = nn.Parameter(torch.zeros(side))
+        self.output_by_column = nn.Parameter(torch.zeros(side))
+        self._dropout = settings.dropout
 
-    def forward(self, windows: Tensor, places: Tensor) -> Tensor:
-        """Map windows (B, W) at places (B,) to logits (B,)."""
-        first = functional.relu(windows @ self.window_weight + self.place[places])
+    def forward(self, windows: Tensor, rows: Tensor, columns: Tensor) -> Tensor:
+        """Map windows (B, W) of cells in rows (B,) and columns (B,) to logits (B,)."""
+        place = self.by_row[rows] + self.by_column[columns]
+        first = self._dropped(functional.relu(windows @ self.window_weight + place))
         second = functional.relu(first @ self.hidden_weight + self.hidden_bias)
-        return (first + second) @ self.output_weight + self.output_place[places]
+        place_output = self.output_by_row[rows] + self.output_by_column[columns]
+        return (first + self._dropped(second)) @ self.output_weight + place_output
+
+    def _dropped(self, values: Tensor) -> Tensor:
+        return functional.dropout(values, self._dropout, training=self.training)
 
     def begin_with(self, start: AutoregressiveNetwork) -> None:
         """Take over the weights of an earlier fit, if it has the same sizes."""
@@ -173,11 +182,11 @@ def _train(
         share = update / settings.updates
         rate = settings.learning_rate * 0.5 * (1.0 + math.cos(math.pi * share))
         optimiser.param_groups[0]["lr"] = rate * min(1.0, (update + 1) / _WARM_UP)
-        windows, places, targets, weights = examples.draw(
+        windows, rows, columns, targets, weights = examples.draw(
             settings.batch_size, settings.plain_share, rng
         )
         loss = functional.binary_cross_entropy_with_logits(
-            network(windows, places), targets, weight=weights
+            network(windows, rows, columns), targets, weight=weights
         )
         optimiser.zero_grad(set_to_none=True)
         torch.autograd.backward(loss)

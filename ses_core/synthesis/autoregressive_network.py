@@ -3,13 +3,14 @@
 An environment is drawn row by row from its start edge to its goal edge, each row from left to
 right. Whether a cell is occupied depends on the cells drawn before it in a window around it:
 
-    a = relu(window @ window_weight + place[cell])
+    a = relu(window @ window_weight + by_row[row] + by_column[column])
     b = a + relu(a @ hidden_weight + hidden_bias)
-    p = sigmoid((b @ output_weight + output_place[cell]) / temperature)
+    p = sigmoid((b @ output_weight + output_by_row[row] + output_by_column[column]) / temperature)
 
-The window's weights are shared by all cells; what is special to a place (the start is free) is
-learned apart. The chance of an environment is the product over its cells, and that is what the
-fit makes as great as it can be: no discriminator, nothing to collapse.
+The window's weights are shared by all cells; what is special to a place (near the start it is
+free) is learned by row and by column, for each cell alone it would be learned by heart. The
+chance of an environment is the product over its cells, and that is what the fit makes as great
+as it can be: no discriminator, nothing to collapse.
 """
 
 from collections.abc import Mapping
@@ -34,22 +35,26 @@ class AutoregressiveNetwork:
 
     Attributes:
         window_weight: (W, H), the window as `causal_windows` lays it out.
-        place: (900, H) added by a cell's place, start edge first.
+        by_row: (30, H) added by a cell's row, start edge first.
+        by_column: (30, H) added by a cell's column.
         hidden_weight: (H, H).
         hidden_bias: (H,).
         output_weight: (H,).
-        output_place: (900,) added by a cell's place.
+        output_by_row: (30,) added by a cell's row, start edge first.
+        output_by_column: (30,) added by a cell's column.
         reach: Rows before the cell, and columns to either side, that its window holds.
         temperature: Logits are divided by this: below 1 what is likely becomes likelier.
         keeps_way_open: A cell that would close the last way stays free.
     """
 
     window_weight: Float32Array
-    place: Float32Array
+    by_row: Float32Array
+    by_column: Float32Array
     hidden_weight: Float32Array
     hidden_bias: Float32Array
     output_weight: Float32Array
-    output_place: Float32Array
+    output_by_row: Float32Array
+    output_by_column: Float32Array
     reach: int
     temperature: float
     keeps_way_open: bool
@@ -73,11 +78,13 @@ class AutoregressiveNetwork:
         """Give what rebuilds it."""
         return {
             "window_weight": self.window_weight,
-            "place": self.place,
+            "by_row": self.by_row,
+            "by_column": self.by_column,
             "hidden_weight": self.hidden_weight,
             "hidden_bias": self.hidden_bias,
             "output_weight": self.output_weight,
-            "output_place": self.output_place,
+            "output_by_row": self.output_by_row,
+            "output_by_column": self.output_by_column,
             "reach": np.array(self.reach),
             "temperature": np.array(self.temperature),
             "keeps_way_open": np.array(self.keeps_way_open),
@@ -90,17 +97,17 @@ class AutoregressiveNetwork:
         signs = padded_signs(np.zeros((size, side, side), dtype=np.bool_), reach)
         signs[:, reach:, reach:-reach] = 0.0
         way = OpenWay(size, radius=radius) if self.keeps_way_open and radius else None
-        place = self.place.reshape(side, side, -1)
         threshold = self.temperature * _logit(uniform)
         for row in range(side):
             # All that comes from earlier rows, for the whole row in one product.
             above = sliding_window_view(signs[:, row : row + reach], 2 * reach + 1, axis=2)
             rows = np.ascontiguousarray(above.transpose(0, 2, 1, 3)).reshape(size * side, before)
-            known = (rows @ self.window_weight[:before]).reshape(size, side, -1) + place[row]
+            known = (rows @ self.window_weight[:before]).reshape(size, side, -1)
+            known += self.by_row[row] + self.by_column
             for column in range(side):
                 left = signs[:, row + reach, column : column + reach]
                 logits = self._logits(known[:, column] + left @ self.window_weight[before:])
-                logits += self.output_place[row * side + column]
+                logits += self.output_by_row[row] + self.output_by_column[column]
                 is_occupied = logits > threshold[:, row, column]
                 if way is not None:
                     is_occupied = way.occupy(row, column, is_occupied)
@@ -152,11 +159,13 @@ def autoregressive_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Aut
         name: np.asarray(arrays[name], dtype=np.float32)
         for name in (
             "window_weight",
-            "place",
+            "by_row",
+            "by_column",
             "hidden_weight",
             "hidden_bias",
             "output_weight",
-            "output_place",
+            "output_by_row",
+            "output_by_column",
         )
     }
     return AutoregressiveNetwork(
