@@ -4,9 +4,11 @@ Shapes and counts are taken from the networks themselves. A convolution is the p
 be over its unfolded images, and is spared the unfolding.
 """
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from torch import Tensor, nn
@@ -14,8 +16,8 @@ from torch import Tensor, nn
 Shape = tuple[int, int, int]
 """(rows, summed over, columns) of a matrix product."""
 
-PASSES = ("forward", "weights", "inputs", "all but first inputs")
-"""Of a network over a batch: its outputs, the gradients of its weights, those of its inputs."""
+Pass = Literal["forward", "weights", "inputs", "all but first inputs"]
+"""Over a batch: a network's outputs, the gradients of its weights, those of its inputs."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Floor:
         return time.process_time() - begun
 
 
-def products(network: nn.Sequential, example: Tensor, passes: Sequence[str]) -> list[Shape]:
+def products(network: nn.Sequential, example: Tensor, passes: Sequence[Pass]) -> list[Shape]:
     """List the products of some passes of a network over a batch like `example`."""
     shapes: list[Shape] = []
     is_first = True
@@ -60,9 +62,9 @@ def products(network: nn.Sequential, example: Tensor, passes: Sequence[str]) -> 
 
 def _weighted(
     network: nn.Sequential, example: Tensor
-) -> list[tuple[nn.Module, torch.Size, torch.Size]]:
-    """Run a network, and give its layers with weights with what they took and gave."""
-    found = []
+) -> list[tuple[nn.Module, Sequence[int], Sequence[int]]]:
+    """Run a network, and give its layers with weights with the shapes they took and gave."""
+    found: list[tuple[nn.Module, Sequence[int], Sequence[int]]] = []
     values = example
     with torch.no_grad():
         for module in network:
@@ -73,10 +75,11 @@ def _weighted(
     return found
 
 
-def _shape(module: nn.Module, inputs: torch.Size, outputs: torch.Size) -> Shape:
-    if isinstance(module, nn.Linear):
-        return inputs[0], inputs[1], outputs[1]
-    kernel = module.kernel_size[0] * module.kernel_size[1]
+def _shape(module: nn.Module, inputs: Sequence[int], outputs: Sequence[int]) -> Shape:
     if isinstance(module, nn.Conv2d):
-        return outputs[0] * outputs[2] * outputs[3], inputs[1] * kernel, outputs[1]
-    return inputs[0] * inputs[2] * inputs[3], inputs[1], outputs[1] * kernel
+        window = math.prod(module.kernel_size)
+        return outputs[0] * outputs[2] * outputs[3], inputs[1] * window, outputs[1]
+    if isinstance(module, nn.ConvTranspose2d):
+        window = math.prod(module.kernel_size)
+        return inputs[0] * inputs[2] * inputs[3], inputs[1], outputs[1] * window
+    return inputs[0], inputs[1], outputs[1]

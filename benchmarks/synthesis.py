@@ -134,7 +134,7 @@ def _mended_row(cells: BoolArray, settings: GanSettings, rounds: int) -> Row:
         floor,
         updates=training.batches,
         rounds=rounds,
-        besides=looking / settings.snapshot_epochs,
+        besides=looking * settings.snapshots / training.epochs,
     )
 
 

@@ -47,6 +47,17 @@ class GanSettings(SettingsModel):
     generator_channels: tuple[int, int] = Field(
         (32, 32), description="Channels of the generator's images of 8 x 8 and 16 x 16 cells."
     )
+    generator_bands: int = Field(
+        1,
+        ge=0,
+        description="Pairs of fields of which a wall is where both are positive; 0 is one field.",
+    )
+    least_obstacle: int = Field(
+        3,
+        ge=1,
+        description="Obstacles of fewer cells are left out of what is drawn. The discriminator "
+        "sees them: where it did not, obstacles just larger took their place.",
+    )
     discriminator_channels: tuple[int, int] = Field(
         (16, 48), description="Channels of the discriminator's images of 16 x 16 and 8 x 8 cells."
     )
@@ -54,13 +65,19 @@ class GanSettings(SettingsModel):
     leaky_slope: float = Field(0.2, gt=0, lt=1, description="Negative slope of the leaky ReLUs.")
     epochs: int = Field(200, ge=1, description="Passes over the challenging environments, at most.")
     least_updates: int = Field(
-        2000, ge=1, description="Updates made even where the epochs would make fewer."
+        3000, ge=1, description="Updates made even where the epochs would make fewer."
     )
     batch_size: int = Field(64, ge=2, description="Environments per update.")
-    learning_rate: float = Field(5e-4, gt=0, description="Of both Adam optimisers.")
+    learning_rate: float = Field(1e-3, gt=0, description="Of both Adam optimisers.")
+    decay_share: float = Field(
+        0.5,
+        gt=0,
+        le=1,
+        description="Last share of the training in which the learning rate falls to nothing.",
+    )
     adam_beta1: float = Field(0.5, ge=0, lt=1, description="First-moment decay of both optimisers.")
     r1_weight: float = Field(
-        1.0,
+        3.0,
         ge=0,
         description="Weight of half the squared slope of the discriminator at real environments.",
     )
@@ -75,7 +92,7 @@ class GanSettings(SettingsModel):
     )
     mirrored: bool = Field(True, description="Real environments are mirrored at random.")
     most_shift: int = Field(
-        2,
+        3,
         ge=0,
         description="Cells by which all that the discriminator sees is shifted, up to, so that it "
         "cannot learn the real ones by heart.",
@@ -90,12 +107,17 @@ class GanSettings(SettingsModel):
         30, ge=2, description="With fewer than that none is held out and the last one is taken."
     )
     most_heldout: int = Field(500, ge=2, description="Most environments held out.")
-    snapshot_epochs: int = Field(10, ge=1, description="Epochs between two that are compared.")
+    snapshots: int = Field(
+        20, ge=1, description="Generators compared, evenly spread over the training."
+    )
+    coverage_draws: int = Field(
+        4, ge=1, description="Samples, each as large as what is held out, averaged per generator."
+    )
     coverage_neighbours: int = Field(
         5, ge=1, description="A held-out one is covered within the distance of this neighbour."
     )
     patience: int = Field(
-        6, ge=1, description="So many compared in a row that are no better end the training."
+        8, ge=1, description="So many compared in a row that are no better end the training."
     )
     least_environments: int = Field(
         30, ge=2, description="With fewer to learn from, mirror images are drawn instead."

@@ -1,10 +1,11 @@
 """SES-GAN, mended and fitted with torch: the discriminator judges what is used.
 
 Against the paper (`gan_paper`): generated environments are binarized before D sees them, the
-loss does not saturate, D's slope at real environments is kept low (R1) in place of dropout,
-both networks end in convolutions (`gan_networks`), real environments are mirrored at random,
-what D sees is shifted so that it cannot learn the real ones by heart, and of the states of G's
-averaged weights the one is kept that covers held-out environments best.
+loss does not saturate, and D's slope at real environments is kept low (R1) in place of batch
+normalization and dropout. G ends and D begins in convolutions, and G draws walls as bands
+between two fields (`gan_networks`). Real environments are mirrored at random, what D sees is
+shifted so that it cannot learn the real ones by heart, and of the states of G's averaged
+weights the one is kept that covers held-out environments best.
 """
 
 import math
@@ -52,12 +53,13 @@ class Gan:
         choice = SnapshotChoice(cells[kept_back], settings=settings, rng=rng.spawn(1)[0])
         with one_seeded_thread(int(rng.integers(2**63))):
             training = GanTraining(cells[taught], settings, earlier)
-            epochs = max(settings.epochs, math.ceil(settings.least_updates / training.batches))
+            epochs = training.epochs
+            between = math.ceil(epochs / settings.snapshots)
             if earlier is not None:
                 choice.consider(training.network())
             for epoch in range(1, epochs + 1):
                 training.epoch()
-                if epoch % settings.snapshot_epochs == 0 or epoch == epochs:
+                if epoch % between == 0 or epoch == epochs:
                     choice.consider(training.network())
                     if choice.is_over:
                         break

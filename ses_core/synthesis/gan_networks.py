@@ -3,6 +3,10 @@
 Where an obstacle stands is settled by fully connected layers, on 8 x 8 coarse cells; what it
 looks like by convolutions, which are the same everywhere. A perceptron would have to learn at
 every cell by itself that a lone occupied one is no obstacle: the paper's speckle.
+
+A wall that a scanner has seen is a line one or two cells wide. G draws it as the band where
+two smooth fields are both positive, which hangs together by itself; a single field would have
+to be a ridge along it. What is filled is a wide band.
 """
 
 import torch
@@ -10,7 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from ses_core.occupancy import ENVIRONMENT_CELLS
-from ses_core.synthesis.generator_modules import AsImage, PositionBias
+from ses_core.synthesis.generator_modules import AsImage, Bands, PositionBias
 from ses_core.synthesis.generator_network import KERNEL, upsampling_padding
 from ses_core.synthesis_settings import GanSettings
 
@@ -22,6 +26,7 @@ def build_generator(settings: GanSettings) -> nn.Sequential:
     """Lay out G: noise (N, latent) to values (N, 900), occupied where positive."""
     slope = settings.leaky_slope
     coarse, fine = settings.generator_channels
+    fields = max(2 * settings.generator_bands, 1)
     hidden, spread = settings.generator_hidden, COARSE_SIDE**2 * coarse
     generator = nn.Sequential(
         nn.Linear(settings.latent_size, hidden),
@@ -34,8 +39,11 @@ def build_generator(settings: GanSettings) -> nn.Sequential:
         nn.ConvTranspose2d(coarse, fine, KERNEL, 2, upsampling_padding(COARSE_SIDE)),
         nn.BatchNorm2d(fine),
         nn.LeakyReLU(slope, inplace=True),
-        nn.ConvTranspose2d(fine, 1, KERNEL, 2, upsampling_padding(2 * COARSE_SIDE), bias=False),
-        PositionBias(),
+        nn.ConvTranspose2d(
+            fine, fields, KERNEL, 2, upsampling_padding(2 * COARSE_SIDE), bias=False
+        ),
+        PositionBias(fields),
+        Bands(),
     )
     for module in generator:
         if isinstance(module, nn.ConvTranspose2d):

@@ -83,6 +83,22 @@ def build_generator(settings: GanPaperSettings) -> nn.Sequential:
     return nn.Sequential(*layers, nn.Linear(size, PIXELS), nn.Tanh())
 
 
+class ByteDropout(nn.Dropout):
+    """Dropout of whole 256ths, of which a random number of 64 bits decides eight.
+
+    Torch's own draws a number for each and takes a sixth of the fit's time for it.
+    """
+
+    def forward(self, values: Tensor) -> Tensor:
+        """Drop some of the values while training, and make up for it."""
+        if not self.training or self.p == 0.0:
+            return values
+        count = values.numel()
+        numbers = torch.empty(-(-count // 8), dtype=torch.int64).random_(-(2**63), None)
+        drawn = numbers.view(torch.uint8)[:count].view_as(values)
+        return values * (drawn >= round(256 * self.p)).to(values.dtype).div_(1.0 - self.p)
+
+
 def build_discriminator(settings: GanPaperSettings) -> nn.Sequential:
     """Lay out D: leaky ReLU, batch normalization and dropout after each layer.
 
@@ -95,7 +111,7 @@ def build_discriminator(settings: GanPaperSettings) -> nn.Sequential:
             nn.Linear(size, width),
             nn.LeakyReLU(settings.leaky_slope, inplace=True),
             nn.BatchNorm1d(width),
-            nn.Dropout(DROPOUT, inplace=True),
+            ByteDropout(DROPOUT),
         ]
         size = width
     return nn.Sequential(*layers, nn.Linear(size, 1))

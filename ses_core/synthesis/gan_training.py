@@ -1,12 +1,17 @@
 """The training of the mended GAN, pass by pass over the real environments."""
 
+import copy
+import math
+from dataclasses import replace
+
+import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from ses_core.arrays import BoolArray
 from ses_core.occupancy import ENVIRONMENT_CELLS
+from ses_core.scorecard.distances import mirrored
 from ses_core.synthesis.gan_networks import (
     binarized,
     build_discriminator,
@@ -15,9 +20,12 @@ from ses_core.synthesis.gan_networks import (
     generator_loss,
     slope_penalty,
 )
-from ses_core.synthesis.generator_modules import as_network, load_network
+from ses_core.synthesis.generator_modules import as_network, keep_free, load_network
 from ses_core.synthesis.generator_network import GeneratorNetwork
 from ses_core.synthesis_settings import GanSettings
+
+ADAM_BETA2 = 0.99
+"""Second-moment decay of both optimisers: a memory of some hundred updates of some thousands."""
 
 
 class GanTraining:
@@ -31,17 +39,25 @@ class GanTraining:
         self.real = torch.from_numpy(cells[:, None]).float() * 2.0 - 1.0
         self.batch_size = min(settings.batch_size, len(cells))
         self.batches = len(cells) // self.batch_size
+        self.epochs = max(settings.epochs, math.ceil(settings.least_updates / self.batches))
         self.updates = 0
         self.generator = build_generator(settings)
         if start is not None:
             load_network(self.generator, start)
-        self.averaged = AveragedModel(
-            self.generator,
-            multi_avg_fn=get_ema_multi_avg_fn(settings.average_decay),
-            use_buffers=True,
-        )
+        shown = np.concatenate((cells, mirrored(cells))) if settings.mirrored else cells
+        keep_free(self.generator, np.logical_not(np.any(shown, axis=0)))
+        self.averaged = copy.deepcopy(self.generator)
+        self._averages = [
+            (average, weight)
+            for average, weight in zip(
+                self.averaged.state_dict().values(),
+                self.generator.state_dict().values(),
+                strict=True,
+            )
+            if average.is_floating_point()
+        ]
         self.discriminator = build_discriminator(settings)
-        betas = (settings.adam_beta1, 0.99)
+        betas = (settings.adam_beta1, ADAM_BETA2)
         self.generator_weights = list(self.generator.parameters())
         self.generator_optimiser = torch.optim.Adam(
             self.generator_weights, lr=settings.learning_rate, betas=betas, fused=True
@@ -52,10 +68,16 @@ class GanTraining:
 
     def network(self) -> GeneratorNetwork:
         """Give the averaged generator as it is now."""
-        return as_network(self.averaged.module, leaky_slope=self.settings.leaky_slope)
+        network = as_network(self.averaged, leaky_slope=self.settings.leaky_slope)
+        return replace(network, least_obstacle=self.settings.least_obstacle)
 
     def epoch(self) -> None:
         """Go once through the real environments, but for a rest too small for a batch."""
+        left = 1.0 - self.updates / (self.epochs * self.batches)
+        rate = self.settings.learning_rate * min(1.0, left / self.settings.decay_share)
+        for optimiser in (self.generator_optimiser, self.discriminator_optimiser):
+            for group in optimiser.param_groups:
+                group["lr"] = rate
         order = torch.randperm(len(self.real))
         for number in range(self.batches):
             chosen = order[number * self.batch_size : (number + 1) * self.batch_size]
@@ -67,7 +89,8 @@ class GanTraining:
         if settings.mirrored:
             is_mirrored = torch.rand(len(real), 1, 1, 1) < 0.5
             real = torch.where(is_mirrored, real.flip(3), real)
-        fake = binarized(self.generator(torch.randn(len(real), settings.latent_size)))
+        noise = torch.randn(len(real), settings.latent_size)
+        fake = binarized(self.generator(noise))
         both = shifted(torch.cat((real, fake.detach())), most=settings.most_shift)
 
         loss_d = discriminator_loss(*self.discriminator(both).chunk(2))
@@ -83,7 +106,8 @@ class GanTraining:
         self.generator_optimiser.zero_grad(set_to_none=True)
         torch.autograd.backward(generator_loss(judged), inputs=self.generator_weights)
         self.generator_optimiser.step()
-        self.averaged.update_parameters(self.generator)
+        for average, weight in self._averages:
+            average.lerp_(weight, 1.0 - settings.average_decay)
         self.updates += 1
 
 

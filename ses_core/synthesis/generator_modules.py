@@ -6,12 +6,15 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ses_core.arrays import Float32Array
+from ses_core.arrays import BoolArray, Float32Array
 from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.synthesis.generator_network import DenseLayer, GeneratorNetwork, UpsamplingLayer
 
 _CALIBRATION_DRAWS = 1024
 """From which a loaded layer's mean and deviation are measured."""
+
+FREE_FOR_GOOD = -20.0
+"""Bias of a cell that must not become occupied: values are mostly below 1, and tanh is flat."""
 
 Weighted = nn.Linear | nn.ConvTranspose2d
 Norm = nn.BatchNorm1d | nn.BatchNorm2d
@@ -31,22 +34,45 @@ class AsImage(nn.Module):
 
 
 class PositionBias(nn.Module):
-    """(N, 1, 30, 30) to (N, 900), plus a bias for every cell of an environment."""
+    """(N, C, 30, 30) plus a bias for every cell of an environment."""
 
-    def __init__(self) -> None:
+    def __init__(self, channels: int) -> None:
         """Start from nothing."""
         super().__init__()
-        self.bias = nn.Parameter(torch.zeros(ENVIRONMENT_CELLS**2))
+        self.bias = nn.Parameter(torch.zeros(channels, ENVIRONMENT_CELLS, ENVIRONMENT_CELLS))
 
     def forward(self, image: Tensor) -> Tensor:
         """Add it."""
-        return image.flatten(1) + self.bias
+        return image + self.bias
+
+
+class Bands(nn.Module):
+    """(N, 2 P, 30, 30) to (N, 900): the highest of P pairs, each as high as its lower half."""
+
+    def forward(self, image: Tensor) -> Tensor:
+        """Join the fields."""
+        count, channels = image.shape[:2]
+        pairs = image.reshape(count, -1, min(channels, 2), ENVIRONMENT_CELLS**2)
+        return pairs.amin(dim=2).amax(dim=1)
+
+
+def keep_free(generator: nn.Sequential, cells: BoolArray) -> None:
+    """Let some cells (30, 30) of what a generator draws be free for good, and no others.
+
+    A cell that no real environment has occupied, as where robots start and arrive, needs no
+    learning. Others are let go that an earlier fit, of other environments, kept free.
+    """
+    kept = torch.from_numpy(cells.copy())
+    with torch.no_grad():
+        for module in generator:
+            if isinstance(module, PositionBias):
+                module.bias[(module.bias < FREE_FOR_GOOD / 2.0) & ~kept] = 0.0
+                module.bias[:, kept] = FREE_FOR_GOOD
 
 
 def as_network(generator: nn.Sequential, *, leaky_slope: float) -> GeneratorNetwork:
     """Take the weights out of a trained generator, as it evaluates (running statistics)."""
     layers: list[DenseLayer | UpsamplingLayer] = []
-    weight, bias = torch.empty(0), torch.empty(0)
     modules = [*generator]
     with torch.no_grad():
         for module, after in zip(modules, [*modules[1:], None], strict=True):
@@ -57,7 +83,7 @@ def as_network(generator: nn.Sequential, *, leaky_slope: float) -> GeneratorNetw
             if isinstance(after, Norm):
                 weight, bias = _folded(weight, bias, after)
             if isinstance(after, PositionBias):
-                bias = after.bias.reshape(ENVIRONMENT_CELLS, ENVIRONMENT_CELLS, 1)
+                bias = after.bias.permute(1, 2, 0)
             kind = DenseLayer if isinstance(module, nn.Linear) else UpsamplingLayer
             layers.append(kind(weight=_float32(weight), bias=_float32(bias)))
     return GeneratorNetwork(layers=tuple(layers), leaky_slope=leaky_slope)
@@ -81,7 +107,7 @@ def load_network(generator: nn.Sequential, network: GeneratorNetwork) -> None:
                 layer = stored.pop(0) if stored else None
                 is_loaded = layer is not None and _load(module, layer)
             elif isinstance(module, PositionBias) and is_loaded and layer is not None:
-                module.bias.copy_(torch.from_numpy(layer.bias).reshape(-1))
+                module.bias.copy_(torch.from_numpy(layer.bias).permute(2, 0, 1))
             elif isinstance(module, Norm) and is_loaded:
                 _calibrate(module, values)
             values = module(values)

@@ -10,15 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from ses_core.arrays import BoolArray, Float32Array
 from ses_core.occupancy import ENVIRONMENT_CELLS
 
-SAMPLES_AT_ONCE = 256
-"""Bounds the memory of a forward pass to some tens of megabytes."""
+SAMPLES_AT_ONCE = 64
+"""What lies between two layers stays in the cache; more at once take longer each."""
 
 KERNEL = 4
 """Side [cells] of an upsampling layer's kernel: each cell spreads over 4 x 4 finer ones."""
+
+_TOUCHING = np.zeros((3, 3, 3), dtype=np.int64)
+_TOUCHING[1] = 1
+"""Neighbours of a cell: the eight around it, none in the environments before and after."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,13 +59,18 @@ class UpsamplingLayer:
         """Map images (N, S, S, C), also given as (N, S * S * C), to (N, T, T, D)."""
         inputs, outputs = self.weight.shape[:2]
         side = round((values[0].size / inputs) ** 0.5)
-        spread = values.reshape(-1, inputs) @ self.weight.transpose(0, 2, 3, 1).reshape(inputs, -1)
-        spread = spread.reshape(len(values), side, side, KERNEL, KERNEL, outputs)
+        padded = np.pad(values.reshape(-1, side, side, inputs), ((0, 0), (1, 1), (1, 1), (0, 0)))
+        # Of a kernel of 4 and a stride of 2, every finer cell gets its share from 2 x 2 coarse
+        # ones: one product gives the 2 x 2 finer cells between them.
+        windows = np.concatenate(
+            [padded[:, 1 - y : side + 2 - y, 1 - x : side + 2 - x] for y in (0, 1) for x in (0, 1)],
+            axis=-1,
+        )
+        kernel = self.weight.reshape(inputs, outputs, 2, 2, 2, 2).transpose(2, 4, 0, 3, 5, 1)
+        spread = windows.reshape(-1, 4 * inputs) @ kernel.reshape(4 * inputs, 4 * outputs)
+        spread = spread.reshape(-1, side + 1, side + 1, 2, 2, outputs).transpose(0, 1, 3, 2, 4, 5)
         whole = 2 * side + 2
-        image = np.zeros((len(values), whole, whole, outputs), dtype=np.float32)
-        for y in range(KERNEL):
-            for x in range(KERNEL):
-                image[:, y : y + 2 * side : 2, x : x + 2 * side : 2] += spread[:, :, :, y, x]
+        image = spread.reshape(-1, whole, whole, outputs)
         margin = upsampling_padding(side)
         return image[:, margin : whole - margin, margin : whole - margin] + self.bias
 
@@ -77,10 +87,12 @@ class GeneratorNetwork:
     Attributes:
         layers: With a leaky ReLU between them; the last one gives 900 values.
         leaky_slope: Negative slope of the leaky ReLUs.
+        least_obstacle: Obstacles of fewer cells are left out of what is drawn.
     """
 
     layers: tuple[DenseLayer | UpsamplingLayer, ...]
     leaky_slope: float
+    least_obstacle: int = 1
 
     @property
     def is_endless(self) -> bool:
@@ -94,7 +106,7 @@ class GeneratorNetwork:
         rng: Generator,
         radius: float | None = None,  # noqa: ARG002  (the seam's: the caller sees to it)
     ) -> BoolArray:
-        """Draw noise from N(0, 1) and binarize what comes out at a threshold of 0."""
+        """Draw noise from N(0, 1), binarize what comes out at 0, and leave out the specks."""
         latent_size = self.layers[0].weight.shape[0]
         noise = rng.standard_normal((count, latent_size), dtype=np.float32)
         side = ENVIRONMENT_CELLS
@@ -102,7 +114,7 @@ class GeneratorNetwork:
         for first in range(0, count, SAMPLES_AT_ONCE):
             values = self.values(noise[first : first + SAMPLES_AT_ONCE])
             cells[first : first + len(values)] = (values > 0.0).reshape(-1, side, side)
-        return cells
+        return without_specks(cells, least=self.least_obstacle)
 
     def values(self, noise: Float32Array) -> Float32Array:
         """Map noise (N, latent) to what comes before the tanh: (N, 900), of the same sign."""
@@ -110,11 +122,17 @@ class GeneratorNetwork:
         for layer in self.layers[:-1]:
             values = layer(values)
             values = np.where(values > 0.0, values, np.float32(self.leaky_slope) * values)
-        return self.layers[-1](values).reshape(len(noise), -1)
+        values = self.layers[-1](values)
+        if values.ndim == 4 and values.shape[-1] > 1:
+            values = np.minimum(values[..., ::2], values[..., 1::2]).max(axis=-1)
+        return values.reshape(len(noise), -1)
 
     def arrays(self) -> Mapping[str, NDArray[np.generic]]:
         """Give what rebuilds it."""
-        arrays: dict[str, NDArray[np.generic]] = {"leaky_slope": np.array(self.leaky_slope)}
+        arrays: dict[str, NDArray[np.generic]] = {
+            "leaky_slope": np.array(self.leaky_slope),
+            "least_obstacle": np.array(self.least_obstacle),
+        }
         for number, layer in enumerate(self.layers):
             arrays[f"layer{number}_weight"] = layer.weight
             arrays[f"layer{number}_bias"] = layer.bias
@@ -134,7 +152,22 @@ def network_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> GeneratorN
             for number in range(max(count, 1))
         ),
         leaky_slope=float(np.asarray(arrays["leaky_slope"], dtype=np.float64)),
+        least_obstacle=int(np.asarray(arrays["least_obstacle"], dtype=np.int64)),
     )
+
+
+def without_specks(cells: BoolArray, *, least: int) -> BoolArray:
+    """Clear the obstacles of environments (N, 30, 30) that have fewer than `least` cells.
+
+    Cells that touch at a corner belong together, as where the scorecard counts obstacles.
+    """
+    if least <= 1:
+        return cells
+    labels, _ = ndimage.label(cells, _TOUCHING)
+    is_kept = np.bincount(labels.reshape(-1)) >= least
+    is_kept[0] = False
+    kept: BoolArray = is_kept[labels]
+    return kept
 
 
 def _layer(weight: NDArray[np.generic], bias: NDArray[np.generic]) -> DenseLayer | UpsamplingLayer:

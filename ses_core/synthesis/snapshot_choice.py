@@ -1,5 +1,8 @@
 """Which state of a generator to keep: the one that covers held-out environments best."""
 
+import math
+import statistics
+
 import numpy as np
 from numpy.random import Generator
 
@@ -15,7 +18,7 @@ def held_out(count: int, *, settings: GanSettings, rng: Generator) -> tuple[IntA
 
     Too few of them would tell nothing: then none is held out.
     """
-    size = min(int(settings.heldout_share * count), settings.most_heldout)
+    size = min(math.floor(settings.heldout_share * count), settings.most_heldout)
     if size < settings.least_heldout:
         size = 0
     order = rng.permutation(count)
@@ -52,13 +55,15 @@ class SnapshotChoice:
 
     def consider(self, network: GeneratorNetwork) -> None:
         """Look at one more; all are given the same noise, so that chance has less of a say."""
-        if len(self._heldout) == 0:
+        count = len(self._heldout)
+        if count == 0:
             self._best = network
             return
-        found = coverage(
-            self._heldout,
-            network.sample(len(self._heldout), rng=np.random.default_rng(self._noise_seed)),
-            k=self._settings.coverage_neighbours,
+        draws = self._settings.coverage_draws
+        drawn = network.sample(draws * count, rng=np.random.default_rng(self._noise_seed))
+        found = statistics.mean(
+            coverage(self._heldout, one, k=self._settings.coverage_neighbours)
+            for one in np.split(drawn, draws)
         )
         if found > self._best_coverage:
             self._best, self._best_coverage, self._worse_in_a_row = network, found, 0

@@ -60,8 +60,8 @@ def test_the_discriminator_judges_each_by_itself() -> None:
     assert torch.allclose(discriminator(images), alone, atol=1e-5)
 
 
-def test_the_discriminator_is_shown_what_is_used() -> None:
-    """The values shown are those of `sample`; the slope is that of the tanh."""
+def test_the_discriminator_is_shown_binary_environments() -> None:
+    """The values shown have the signs that `sample` goes by; the slope is that of the tanh."""
     values = torch.randn(4, 900, requires_grad=True)
     images = binarized(values)
     assert torch.equal(images.flatten(1) > 0, values > 0)
@@ -133,6 +133,26 @@ def test_mirrored_environments_are_learned_too() -> None:
     assert drawn[:, :, :6].mean() > 0.2
 
 
+def test_what_no_real_environment_has_occupied_is_never_occupied() -> None:
+    """Nor its mirror image, where mirror images count."""
+    cells = rooms(64)
+    cells[:, :3, 5:9] = False
+    cells[:, :3, 21:25] = False
+    drawn = fit(SMALL, cells=cells).sample(200, rng=default_rng(1))
+    assert not drawn[:, :3, 5:9].any()
+    assert drawn.any()
+
+
+def test_the_learning_rate_falls_to_nothing() -> None:
+    with one_seeded_thread(0):
+        training = GanTraining(rooms(64), changed(epochs=4, decay_share=0.5), None)
+        rates = []
+        for _ in range(4):
+            training.epoch()
+            rates.append(training.generator_optimiser.param_groups[0]["lr"])
+    assert rates == pytest.approx([1e-3, 1e-3, 1e-3, 5e-4])
+
+
 def test_fitting_leaves_torch_as_it_was() -> None:
     threads, state = torch.get_num_threads(), torch.random.get_rng_state()
     fit(SMALL)
@@ -177,5 +197,5 @@ def test_the_averaged_generator_moves_less_than_the_trained_one() -> None:
 
 @pytest.mark.parametrize("heldout_share", [0.0, 0.5])
 def test_both_ways_of_ending_give_a_generator(heldout_share: float) -> None:
-    settings = changed(heldout_share=heldout_share, least_heldout=2, snapshot_epochs=1, patience=1)
+    settings = changed(heldout_share=heldout_share, least_heldout=2, patience=1)
     assert fit(settings).sample(3, rng=default_rng(0)).shape == (3, 30, 30)

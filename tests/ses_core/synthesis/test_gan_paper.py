@@ -4,6 +4,7 @@ import torch
 from numpy.random import default_rng
 
 from ses_core.synthesis.gan_paper import (
+    ByteDropout,
     GanPaper,
     build_discriminator,
     build_generator,
@@ -91,7 +92,7 @@ def test_training_learns_where_the_walls_are(loss: str, apart: float) -> None:
     cells[:, :, :6] = True
     cells[:, :, 15:] = False
     settings = GanPaperSettings(
-        epochs=60, least_updates=1, learning_rate=1e-3, latent_size=8, loss=loss
+        epochs=150, least_updates=1, learning_rate=1e-3, latent_size=8, loss=loss
     )
     fitted = GanPaper(settings).fit(domain_of(cells), rng=default_rng(0), progress=lambda _: None)
     drawn = fitted.sample(200, rng=default_rng(1))
@@ -132,3 +133,16 @@ def test_equal_seeds_give_equal_bytes() -> None:
     settings = GanPaperSettings(epochs=2, least_updates=1)
     first, second = fit(settings).arrays(), fit(settings).arrays()
     assert all(np.array_equal(first[name], second[name]) for name in first)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5])
+def test_dropout_drops_its_share_of_each_place(share: float) -> None:
+    dropout = ByteDropout(share)
+    with one_seeded_thread(0):
+        kept = torch.stack([dropout(torch.ones(5, 13)) for _ in range(4000)])
+    assert kept.unique().tolist() == pytest.approx([0.0, 1.0 / (1.0 - share)])
+    assert (kept.mean(dim=0) - 1.0).abs().max() < 0.08
+    flat = (kept > 0).reshape(4000, -1).float()
+    assert (torch.corrcoef(flat.T) - torch.eye(65)).abs().max() < 0.08
+    dropout.eval()
+    assert torch.equal(dropout(torch.ones(3)), torch.ones(3))

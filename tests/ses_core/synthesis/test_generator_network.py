@@ -1,17 +1,20 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from numpy.random import default_rng
+from scipy import ndimage
 from torch import nn
 
 from ses_core.synthesis import gan_networks, gan_paper
-from ses_core.synthesis.generator_modules import as_network, load_network
+from ses_core.synthesis.generator_modules import Bands, as_network, keep_free, load_network
 from ses_core.synthesis.generator_network import (
     SAMPLES_AT_ONCE,
     GeneratorNetwork,
     network_from_arrays,
+    without_specks,
 )
 from ses_core.synthesis.seeded_torch import one_seeded_thread
 from ses_core.synthesis_settings import GanPaperSettings, GanSettings
@@ -111,8 +114,8 @@ def test_a_missing_layer_is_missed() -> None:
         network_from_arrays({"leaky_slope": np.array(0.2)})
 
 
-def test_a_network_keeps_its_sign_per_cell() -> None:
-    """A bias of one cell moves that cell alone: rows, columns and order are not mixed up."""
+def test_a_bias_moves_its_own_cell_alone() -> None:
+    """Rows, columns and order are not mixed up on the way out of torch."""
     network = as_network(used_generator("gan"), leaky_slope=SLOPE)
     last = network.layers[-1]
     bias = last.bias.copy()
@@ -125,3 +128,49 @@ def test_a_network_keeps_its_sign_per_cell() -> None:
     assert cells[:, 3, 20].all()
     differs[:, 3, 20] = False
     assert not differs.any()
+
+
+def test_walls_are_where_both_fields_of_a_pair_are_positive() -> None:
+    fields = torch.randn(5, 4, 30, 30)
+    found = Bands()(fields).reshape(5, 30, 30) > 0
+    first, second = (fields[:, :2] > 0).all(dim=1), (fields[:, 2:] > 0).all(dim=1)
+    assert torch.equal(found, first | second)
+    single = torch.randn(5, 1, 30, 30)
+    assert torch.equal(Bands()(single), single.flatten(1))
+
+
+def test_cells_kept_free_stay_free_until_they_are_let_go() -> None:
+    generator = used_generator("gan")
+    kept = np.zeros((30, 30), dtype=np.bool_)
+    kept[0, 5:9] = True
+    keep_free(generator, kept)
+    drawn = as_network(generator, leaky_slope=SLOPE).sample(300, rng=default_rng(0))
+    assert not drawn[:, kept].any()
+    keep_free(generator, np.zeros_like(kept))
+    drawn = as_network(generator, leaky_slope=SLOPE).sample(300, rng=default_rng(0))
+    assert drawn[:, kept].any()
+
+
+def test_specks_are_left_out_and_obstacles_are_not() -> None:
+    """Against a count of each obstacle's cells, one at a time."""
+    cells = default_rng(0).random((40, 30, 30)) < 0.15
+    expected = np.zeros_like(cells)
+    for kept, place in zip(expected, cells, strict=True):
+        labels, count = ndimage.label(place, np.ones((3, 3)))
+        for number in range(1, count + 1):
+            if (labels == number).sum() >= 4:
+                kept |= labels == number
+    assert np.array_equal(without_specks(cells, least=4), expected)
+    assert np.array_equal(without_specks(cells, least=1), cells)
+    empty = np.zeros((2, 30, 30), dtype=np.bool_)
+    assert not without_specks(empty, least=4).any()
+
+
+def test_specks_are_left_out_of_samples() -> None:
+    network = as_network(used_generator("gan"), leaky_slope=SLOPE)
+    without = replace(network, least_obstacle=5)
+    expected = without_specks(network.sample(30, rng=default_rng(4)), least=5)
+    assert np.array_equal(without.sample(30, rng=default_rng(4)), expected)
+    assert np.array_equal(
+        network_from_arrays(without.arrays()).sample(30, rng=default_rng(4)), expected
+    )
