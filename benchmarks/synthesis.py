@@ -153,6 +153,7 @@ def _epoch_row(
 ) -> Row:
     """Compare an epoch, and what comes `besides` [s], with the products of its updates."""
     ours, least = [], []
+    epoch()  # makes the optimisers' memory, once per fit
     for _ in range(rounds):
         least.append(floor.seconds(updates))
         ours.append(_cpu_time(epoch) + besides)

@@ -140,7 +140,7 @@ def test_dropout_drops_its_share_of_each_place(share: float) -> None:
     dropout = ByteDropout(share)
     with one_seeded_thread(0):
         kept = torch.stack([dropout(torch.ones(5, 13)) for _ in range(4000)])
-    assert kept.unique().tolist() == pytest.approx([0.0, 1.0 / (1.0 - share)])
+    assert sorted(set(kept.reshape(-1).tolist())) == pytest.approx([0.0, 1.0 / (1.0 - share)])
     assert (kept.mean(dim=0) - 1.0).abs().max() < 0.08
     flat = (kept > 0).reshape(4000, -1).float()
     assert (torch.corrcoef(flat.T) - torch.eye(65)).abs().max() < 0.08
