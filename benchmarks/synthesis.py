@@ -43,7 +43,7 @@ DRAWING_BAR_S = 5.0
 SHORT_FITS: tuple[SynthesizerSettings, ...] = (
     GanPaperSettings(epochs=10, least_updates=1),
     GanSettings(epochs=10, least_updates=1),
-    AutoregressiveSettings(epochs=1),
+    AutoregressiveSettings(updates=100),
 )
 
 Row = dict[str, str | float]
