@@ -15,7 +15,7 @@ from ses_core.settings import (
     Settings,
     TrainingSettings,
 )
-from ses_core.synthesis_settings import GanSettings, SynthesisSettings
+from ses_core.synthesis_settings import AutoregressiveSettings, SynthesisSettings
 from storage.artifact_store import LocalArtifactStore
 from tasks.deploy import DemonstrationFleet, deploy_demonstration
 
@@ -26,7 +26,7 @@ SETTINGS = Settings(
     filter=FilterSettings(challenging_share=0.23),
     synthesis=SynthesisSettings(
         environments=40,
-        synthesizer=GanSettings(least_updates=1000, epochs=1, least_environments=20),
+        synthesizer=AutoregressiveSettings(updates=1000, least_environments=20),
     ),
     training=TrainingSettings(steps=10_000, parallel_envs=50),
     evaluation=EvaluationSettings(trials=3, min_distance_m=8.0),

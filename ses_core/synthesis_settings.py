@@ -233,7 +233,9 @@ SynthesizerSettings = Annotated[
 class SynthesisSettings(SettingsModel):
     """From thousands of challenging environments to about a hundred (section III-C)."""
 
-    synthesizer: SynthesizerSettings = Field(GanSettings(), description="How they are made.")
+    synthesizer: SynthesizerSettings = Field(
+        AutoregressiveSettings(), description="How they are made."
+    )
     environments: int = Field(100, ge=1, description="M: environments to train in.")
     least_pool: int = Field(
         10,
