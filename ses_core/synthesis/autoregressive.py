@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.random import Generator
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -71,13 +72,13 @@ class Examples:
     """Cells to learn from, those of the environments and of their mirror images.
 
     Attributes:
-        windows: (2 N, 30, 30, R + 1, 2 R + 1) view of `causal_windows`.
+        windows: (2 N, 30, 30, R + 1, 2 R + 1) view of `causal_windows`, a byte a cell.
         telling: (T,) flat indices of the cells that differ from a neighbour before them, or
             follow on one that did.
         plain: (P,) flat indices of all others.
     """
 
-    windows: Float32Array
+    windows: NDArray[np.int8]
     telling: IntArray
     plain: IntArray
 
@@ -88,7 +89,7 @@ class Examples:
         both = np.concatenate((from_start, from_start[:, :, ::-1]))
         is_telling = _is_telling(both).ravel()
         return cls(
-            windows=causal_windows(padded_signs(both, reach), reach),
+            windows=causal_windows(padded_signs(both, reach).astype(np.int8), reach),
             telling=np.flatnonzero(is_telling),
             plain=np.flatnonzero(~is_telling),
         )
@@ -111,10 +112,10 @@ class Examples:
         flat = self.windows[image, row, column].reshape(size, -1)
         inputs = window_size(self.windows.shape[3] - 1)
         return (
-            torch.from_numpy(np.ascontiguousarray(flat[:, :inputs])),
+            torch.from_numpy(flat[:, :inputs].astype(np.float32)),
             torch.from_numpy(row),
             torch.from_numpy(column),
-            torch.from_numpy((flat[:, inputs] > 0.0).astype(np.float32)),
+            torch.from_numpy((flat[:, inputs] > 0).astype(np.float32)),
             torch.from_numpy(weights),
         )
 
@@ -123,7 +124,7 @@ def _is_telling(cells: BoolArray) -> BoolArray:
     """Tell which cells (N, 30, 30) are not simply like the three cells before them."""
     padded = np.pad(cells, ((0, 0), (2, 0), (2, 2)))
     size = ENVIRONMENT_CELLS
-    nearby = np.zeros_like(cells, dtype=np.int64)
+    nearby = np.zeros_like(cells, dtype=np.uint8)
     for down in range(3):
         for right in range(5):
             if down < 2 or right <= 2:

@@ -15,6 +15,7 @@ as it can be: no discriminator, nothing to collapse.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -24,6 +25,8 @@ from numpy.typing import NDArray
 from ses_core.arrays import BoolArray, Float32Array
 from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.synthesis.open_way import OpenWay
+
+Sign = TypeVar("Sign", np.float32, np.int8)
 
 SAMPLES_AT_ONCE = 256
 """Bounds the memory of a draw: the windows of one row of a batch take some 10 MB."""
@@ -134,14 +137,13 @@ def padded_signs(cells: BoolArray, reach: int) -> Float32Array:
     return signs
 
 
-def causal_windows(signs: Float32Array, reach: int) -> Float32Array:
+def causal_windows(signs: NDArray[Sign], reach: int) -> NDArray[Sign]:
     """View the windows of padded signs (N, 30 + R, 30 + 2 R): (N, 30, 30, R + 1, 2 R + 1).
 
     Flattened, the first R (2 R + 1) + R values of one are what its cell is drawn from: R rows
     before it, then R cells to its left. The next value is the cell itself.
     """
-    windows: Float32Array = sliding_window_view(signs, (reach + 1, 2 * reach + 1), axis=(1, 2))
-    return windows
+    return sliding_window_view(signs, (reach + 1, 2 * reach + 1), axis=(1, 2))
 
 
 def window_size(reach: int) -> int:

@@ -83,7 +83,7 @@ def test_torch_trains_the_network_that_numpy_draws_from() -> None:
     flat = examples.windows[0].reshape(900, -1)[:, : network.window_weight.shape[0]]
     with torch.no_grad():
         rows, columns = torch.arange(900) // 30, torch.arange(900) % 30
-        logits = trained(torch.from_numpy(flat.copy()), rows, columns).numpy()
+        logits = trained(torch.from_numpy(flat.astype(np.float32)), rows, columns).numpy()
     expected = chances(network, cells[0])[::-1].ravel()
     assert np.abs(1.0 / (1.0 + np.exp(-logits)) - expected).max() < 1e-5
 
