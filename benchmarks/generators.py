@@ -24,6 +24,7 @@ from _shared_worlds import shared_path
 from ses_core.extraction.selection import FilterFunnel, select_challenging
 from ses_core.navigation import NavigationDomain, NavigationEnvironment
 from ses_core.pictures.gallery import contact_sheet
+from ses_core.recipes import JsonValue, digest_json, settings_json
 from ses_core.robot_profile import JACKAL
 from ses_core.scorecard.halving import coarsest_grouping
 from ses_core.scorecard.result import Scorecard
@@ -49,6 +50,7 @@ from storage.environment_files import read_environments, write_environments
 from storage.layout import Layout
 from storage.policy_files import find_policy
 from storage.scorecard_files import SCORECARD_FILE, read_scorecard, write_scorecard
+from storage.selection_files import domain_digest
 from storage.table_reader import open_table
 
 FILTER = FilterSettings(
@@ -67,6 +69,7 @@ SYNTHESIZERS: tuple[SynthesizerSettings, ...] = (
     IdentitySettings(),
     MirrorSettings(),
 )
+SCORING = ScorecardSettings()
 SAMPLES = 1000
 SEEDS = 3
 SHOWN = 40
@@ -154,26 +157,32 @@ class ScoredRun:
 def scored_run(
     synthesizer: SynthesizerSettings, seed: int, learned: Places, judge: Places, stores: Path
 ) -> ScoredRun:
-    """Fit, draw and score; what was done before is found."""
-    name = f"{synthesizer.method}-{seed}"
-    drawn, scored = stores / "drawn" / name, stores / f"scored-{judge.part}" / name
+    """Fit, draw and score; what was done before, under the same settings, is found."""
+    settings = SynthesisSettings(synthesizer=synthesizer, environments=SAMPLES, seed=seed)
+    key = digest_json([settings_json(settings), domain_digest(learned.domain)])
+    name = f"{synthesizer.method}-{seed}-{key[:8]}"
+    drawn = stores / "drawn" / name
     if not (drawn / COST_FILE).exists():
         drawn.mkdir(parents=True, exist_ok=True)
-        cost = _draw(synthesizer, seed, learned, drawn)
+        cost = _draw(settings, learned, drawn)
         (drawn / COST_FILE).write_text(json.dumps(cost))
     cost = json.loads((drawn / COST_FILE).read_text())
+    made = read_environments(drawn)
+    judged_by: list[JsonValue] = [
+        settings_json(SCORING),
+        domain_digest(judge.domain),
+        domain_digest(made),
+    ]
+    scored = stores / f"scored-{judge.part}" / f"{name}-{digest_json(judged_by)[:8]}"
     if not (scored / SCORECARD_FILE).exists():
-        write_scorecard(scored, _score(read_environments(drawn), cost, learned, judge).rows)
+        write_scorecard(scored, _score(made, cost, learned, judge).rows)
         print(f"{name}: scored by {judge.part}", flush=True)
     return ScoredRun(rows=read_scorecard(scored), cost=cost)
 
 
-def _draw(
-    synthesizer: SynthesizerSettings, seed: int, learned: Places, into: Path
-) -> dict[str, float]:
+def _draw(settings: SynthesisSettings, learned: Places, into: Path) -> dict[str, float]:
     """Fit and draw, keep the environments and a contact sheet, give what it cost."""
-    settings = SynthesisSettings(synthesizer=synthesizer, environments=SAMPLES, seed=seed)
-    fit_rng, draw_rng = (np.random.default_rng([seed, step]) for step in (0, 1))
+    fit_rng, draw_rng = (np.random.default_rng([settings.seed, step]) for step in (0, 1))
     started = time.process_time()
     fitted = fit_synthesis(learned.domain, settings=settings, rng=fit_rng, progress=lambda _: None)
     fitted_at = time.process_time()
@@ -183,7 +192,8 @@ def _draw(
     drawn_at = time.process_time()
     write_environments(into, result.environments, target=JACKAL)
     shown = result.environments.cells()[:SHOWN]
-    sheet = contact_sheet(shown, np.ones_like(shown), title=f"{synthesizer.method}, seed {seed}")
+    title = f"{settings.synthesizer.method}, seed {settings.seed}"
+    sheet = contact_sheet(shown, np.ones_like(shown), title=title)
     (into / "sheet.png").write_bytes(sheet)
     shipped = len(result.environments.environments)
     return {
@@ -205,7 +215,7 @@ def _score(
         judge.domain.cells(),
         made.cells(),
         coarsest_grouping(judge.sites, judge.sites, count=len(judge.sites)),
-        settings=ScorecardSettings(),
+        settings=SCORING,
         target=JACKAL,
         driver=Driver(
             name=DRIVER,

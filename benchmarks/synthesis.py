@@ -177,7 +177,8 @@ def _drawing_row(settings: SynthesizerSettings, domain: NavigationDomain, drawn:
     most = SynthesisSettings().most_repaired_cells
 
     def sample(count: int) -> BoolArray:
-        return fitted.sample(count, rng=np.random.default_rng(SEED))
+        radius = JACKAL.inscribed_radius_m
+        return fitted.sample(count, rng=np.random.default_rng(SEED), radius=radius)
 
     repair(sample(2), radius=JACKAL.inscribed_radius_m, most=most)
     begun = time.perf_counter()

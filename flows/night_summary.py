@@ -89,6 +89,11 @@ class ScorecardEntry(_Part):
     real_value: float | None
     real_low: float | None
     real_high: float | None
+    p_value: float | None
+    real_p_value: float | None
+    n_real: int
+    n_synthesized: int
+    halves: str
     standing: Standing = Field(description="Whether it is worse than real-against-real allows.")
     note: str
 

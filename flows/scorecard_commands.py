@@ -67,11 +67,19 @@ def scorecard(
     from storage.environment_files import read_environments
 
     folders = {"--real": real, "--synthesized": synthesized, "--training": training}
+    identities: dict[str, set[str]] = {}
     for option, folder in folders.items():
         if folder is None:
             continue
         with misuse(option):
-            read_environments(folder)
+            environments = read_environments(folder).environments
+        identities[option] = {environment.environment_id for environment in environments}
+    if shared := identities["--real"] & identities.get("--training", set()):
+        raise typer.BadParameter(
+            f"found {len(shared)} environments that are in --real too, expected held-out ones "
+            "there; leave --training out where the real ones were learned from",
+            param_hint="--training",
+        )
     with embedded_server(command.root):
         from flows.environment_scorecard import scorecard as scorecard_flow
         from storage.scorecard_files import row_record

@@ -73,8 +73,7 @@ class Synthesizer(Protocol):
             rng: Source of chance.
             progress: Hears the share that is done, from 0 to 1.
             start: Earlier fit of the same method to go on from (a warm start); methods whose
-                fit has no beginning pay it no heed. Where its arrays have other shapes than
-                those of this fit, the caller fits again without it.
+                fit has no beginning pay it no heed.
         """
         ...
 

@@ -9,6 +9,8 @@ from pydantic import Field
 
 from ses_core.settings_model import SettingsModel
 
+Channels = Annotated[int, Field(ge=1)]
+
 
 class GanPaperSettings(SettingsModel):
     """SES-GAN as printed: the paper's layers and loss; what it leaves open is a setting here."""
@@ -44,7 +46,7 @@ class GanSettings(SettingsModel):
     method: Literal["gan"] = "gan"
     latent_size: int = Field(64, ge=1, description="Length of the noise vector.")
     generator_hidden: int = Field(256, ge=1, description="Units after the noise.")
-    generator_channels: tuple[int, int] = Field(
+    generator_channels: tuple[Channels, Channels] = Field(
         (32, 32), description="Channels of the generator's images of 8 x 8 and 16 x 16 cells."
     )
     generator_bands: int = Field(
@@ -58,7 +60,7 @@ class GanSettings(SettingsModel):
         description="Obstacles of fewer cells are left out of what is drawn. The discriminator "
         "sees them: where it did not, obstacles just larger took their place.",
     )
-    discriminator_channels: tuple[int, int] = Field(
+    discriminator_channels: tuple[Channels, Channels] = Field(
         (16, 48), description="Channels of the discriminator's images of 16 x 16 and 8 x 8 cells."
     )
     discriminator_hidden: int = Field(128, ge=1, description="Units before its verdict.")
@@ -117,7 +119,7 @@ class GanSettings(SettingsModel):
         5, ge=1, description="A held-out one is covered within the distance of this neighbour."
     )
     patience: int = Field(
-        8, ge=1, description="So many compared in a row that are no better end the training."
+        8, ge=1, description="So many compared in a row that are worse end the training."
     )
     least_environments: int = Field(
         30, ge=2, description="With fewer to learn from, mirror images are drawn instead."
@@ -257,6 +259,6 @@ class SynthesisSettings(SettingsModel):
     warm_start: bool = Field(
         False,
         description="Go on from the newest earlier fit of the same synthesizer; else learn from "
-        "nothing, which any machine can repeat.",
+        "nothing, which needs no history to be repeated.",
     )
     seed: int = Field(0, ge=0, description="Seed of the fit and of the samples.")

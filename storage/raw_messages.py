@@ -86,7 +86,9 @@ def _sqlite_messages(path: Path, wanted: dict[int, Connection]) -> Iterator[RawM
                 f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({places})",
                 tuple(wanted),
             ):
-                yield wanted[topic], stamp, content
+                # A damaged file may hold the number as text, which SQL takes for equal.
+                if (connection := wanted.get(topic)) is not None:
+                    yield connection, stamp, content
     except sqlite3.DatabaseError as error:
         raise LogError("truncated", f"database cannot be read: {error}") from error
 

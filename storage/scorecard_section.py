@@ -163,7 +163,7 @@ def _tiles(rows: Sequence[ScorecardRow]) -> tuple[Tile, ...]:
         tiles.append(
             Tile(
                 value=_number(shipped.real_value, shipped.unit),
-                words="of the real ones they were learned from",
+                words="of the real ones they are compared with",
             )
         )
     marked, judged = _marked(rows)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -116,8 +117,13 @@ def read_pool(directory: Path) -> NavigationDomain:
 
 
 def domain_digest(domain: NavigationDomain) -> str:
-    """Digest which environments a domain holds, in their order."""
-    return digest_json([environment.environment_id for environment in domain.environments])
+    """Digest which environments a domain holds, in their order, and their cells.
+
+    An id alone would do for extracted ones; a file of the user's own may keep ids of other cells.
+    """
+    identities = [environment.environment_id for environment in domain.environments]
+    cells = np.packbits(domain.cells()).tobytes() if identities else b""
+    return digest_json([identities, sha256(cells).hexdigest()])
 
 
 def _records(rows: pd.DataFrame) -> list[dict[str, Any]]:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from scipy.stats import mannwhitneyu
 
 from ses_core.arrays import BoolArray, Float32Array, FloatArray, IntArray
 from ses_core.scorecard.distances import nearest
@@ -127,6 +126,9 @@ def memorisation_beside_heldout(
 
 def _compared(synthesized: FloatArray, real: FloatArray, rng: Generator) -> Memorisation:
     """Compare the distances (M,) of synthesized ones with those (N,) of real ones."""
+    # scipy.stats takes half a second to import: flows that only name a task need not wait for it.
+    from scipy.stats import mannwhitneyu
+
     test = mannwhitneyu(synthesized, real, alternative="less")
     resampled = [
         chance_nearer(rng.choice(synthesized, len(synthesized)), rng.choice(real, len(real)))

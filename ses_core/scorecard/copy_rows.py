@@ -121,14 +121,20 @@ def _memorisation_row(
     found = _memorisation(real, synthesized, grouping, mirrored_too, rng, training)
     if found is not None:
         middle = np.median(found.synthesized), np.median(found.real)
+        others = ", of other groups" if training is None else ""
         note = (
-            f"median to the nearest one learned from, of other groups: {middle[0]:.4g} cells, "
+            f"median to the nearest one learned from{others}: {middle[0]:.4g} cells, "
             f"of real ones {middle[1]:.4g} cells"
         )
-    else:
+    elif training is None:
         note = (
             f"too few: n={len(synthesized)} synthesized and {grouping.count} groups of real "
             "ones, expected 1 and 2"
+        )
+    else:
+        note = (
+            f"too few: n={len(synthesized)} synthesized, {len(real)} real and {len(training)} "
+            "learned from, expected 1 of each"
         )
     return ScorecardRow(
         metric="memorisation",

@@ -123,7 +123,18 @@ class BatchSimulator:
         self._run(ADVANCE, self._outside, parameters=self._checked(parameters), ticks=ticks)
 
     def trace_into(self, trace: Trace) -> None:
-        """Write every tick from now on into arrays of N slots, as long as an episode lasts."""
+        """Write every tick from now on into arrays of N slots, as long as an episode lasts.
+
+        Raises:
+            ValueError: Slots, beams or number of scans do not fit.
+        """
+        rows = trace.poses.shape[1]
+        scans = (rows - 1) // self._setup.sense_every + 1
+        expected = (self.slots, scans, self._memory.scans.shape[1])
+        if trace.scans.shape != expected or len(trace.poses) != self.slots:
+            raise ValueError(
+                f"trace of {rows} rows has scans of shape {trace.scans.shape}, expected {expected}"
+            )
         self._trace = trace
 
     def plan_commands(self, parameters: FloatArray) -> FloatArray:

@@ -73,8 +73,7 @@ class Examples:
 
     Attributes:
         windows: (2 N, 30, 30, R + 1, 2 R + 1) view of `causal_windows`, a byte a cell.
-        telling: (T,) flat indices of the cells that differ from a neighbour before them, or
-            follow on one that did.
+        telling: (T,) flat indices of the cells with something other among those before them.
         plain: (P,) flat indices of all others.
     """
 
@@ -96,17 +95,19 @@ class Examples:
 
     def draw(self, size: int, plain_share: float, rng: Generator) -> tuple[Tensor, ...]:
         """Draw a batch: windows (B, W), rows, columns, occupied or not, and weights (B,)."""
-        plain = round(plain_share * size) if len(self.plain) else 0
-        chosen = np.concatenate(
-            (
-                self.telling[rng.integers(len(self.telling), size=size - plain)],
-                self.plain[rng.integers(max(len(self.plain), 1), size=plain)],
-            )
-        )
+        plain = min(max(round(plain_share * size), 1), size - 1)
+        if not (len(self.telling) and len(self.plain)):
+            plain = size if len(self.plain) else 0
         total = len(self.telling) + len(self.plain)
+        parts: list[IntArray] = []
         weights = np.empty(size, dtype=np.float32)
-        weights[: size - plain] = len(self.telling) / total * size / (size - plain)
-        weights[size - plain :] = len(self.plain) / total * size / max(plain, 1)
+        telling = size - plain
+        for pool, share in ((self.telling, slice(0, telling)), (self.plain, slice(telling, size))):
+            drawn = share.stop - share.start
+            if drawn:
+                parts.append(pool[rng.integers(len(pool), size=drawn)])
+                weights[share] = len(pool) / total * size / drawn
+        chosen = np.concatenate(parts)
         image, place = np.divmod(chosen, ENVIRONMENT_CELLS**2)
         row, column = np.divmod(place, ENVIRONMENT_CELLS)
         flat = self.windows[image, row, column].reshape(size, -1)
@@ -121,7 +122,7 @@ class Examples:
 
 
 def _is_telling(cells: BoolArray) -> BoolArray:
-    """Tell which cells (N, 30, 30) are not simply like the three cells before them."""
+    """Tell which cells (N, 30, 30) are not all alike with the twelve nearest before them."""
     padded = np.pad(cells, ((0, 0), (2, 0), (2, 2)))
     size = ENVIRONMENT_CELLS
     nearby = np.zeros_like(cells, dtype=np.uint8)

@@ -42,14 +42,15 @@ class Gan:
         A warm start takes the generator's weights from an earlier fit, layer by layer where
         their shapes agree. An earlier fit holds no discriminator: this one begins anew and
         pulls at a good generator before it can judge, so the first epochs make it worse. Where
-        nothing better comes of it, the generator it started from is what is given back.
+        nothing better comes of it, the generator it started from is what is given back, if
+        there are enough environments to hold some out (300 by default).
 
         Leaves torch's random state and thread count as they were.
         """
         settings = self.settings
         cells = domain.cells()
         earlier = start if isinstance(start, GeneratorNetwork) else None
-        taught, kept_back = held_out(len(cells), settings=settings, rng=rng)
+        taught, kept_back = held_out(domain, settings=settings)
         choice = SnapshotChoice(cells[kept_back], settings=settings, rng=rng.spawn(1)[0])
         with one_seeded_thread(int(rng.integers(2**63))):
             training = GanTraining(cells[taught], settings, earlier)

@@ -11,7 +11,6 @@ to be a ridge along it. What is filled is a wide band.
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.synthesis.generator_modules import AsImage, Bands, PositionBias
@@ -87,16 +86,6 @@ def binarized(values: Tensor) -> Tensor:
     soft = torch.tanh(values)
     hard = torch.where(values > 0.0, 1.0, -1.0)
     return (soft + (hard - soft).detach()).view(-1, 1, ENVIRONMENT_CELLS, ENVIRONMENT_CELLS)
-
-
-def discriminator_loss(real: Tensor, fake: Tensor) -> Tensor:
-    """Equation 1 for D, negated, of the logits (B, 1) of real and generated environments."""
-    return functional.softplus(-real).mean() + functional.softplus(fake).mean()
-
-
-def generator_loss(fake: Tensor) -> Tensor:
-    """-log D(G(z)) of the logits (B, 1): it pulls hardest where D is sure (non-saturating)."""
-    return functional.softplus(-fake).mean()
 
 
 def slope_penalty(discriminator: nn.Module, real: Tensor) -> Tensor:

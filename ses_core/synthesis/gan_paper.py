@@ -18,11 +18,11 @@ import numpy as np
 import torch
 from numpy.random import Generator
 from torch import Tensor, nn
-from torch.nn import functional
 
 from ses_core.navigation import NavigationDomain
 from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.protocols import FittedSynthesizer
+from ses_core.synthesis.adversarial_losses import discriminator_loss, generator_loss
 from ses_core.synthesis.generator_modules import as_network, load_network
 from ses_core.synthesis.generator_network import GeneratorNetwork
 from ses_core.synthesis.seeded_torch import one_seeded_thread
@@ -168,15 +168,3 @@ def judge(
         return discriminator(real), discriminator(fake)
     judged_real, judged_fake = discriminator(torch.cat((real, fake))).chunk(2)
     return judged_real, judged_fake
-
-
-def discriminator_loss(real: Tensor, fake: Tensor) -> Tensor:
-    """Equation 1 for D, negated, of the logits (B, 1) of real and generated environments."""
-    return functional.softplus(-real).mean() + functional.softplus(fake).mean()
-
-
-def generator_loss(fake: Tensor, *, loss: str) -> Tensor:
-    """Equation 1's log(1 - D(G(z))) of the generated half, or the non-saturating -log D(G(z))."""
-    if loss == "saturating":
-        return -functional.softplus(fake).mean()
-    return functional.softplus(-fake).mean()

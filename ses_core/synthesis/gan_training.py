@@ -12,12 +12,11 @@ from torch.nn import functional
 from ses_core.arrays import BoolArray
 from ses_core.occupancy import ENVIRONMENT_CELLS
 from ses_core.scorecard.distances import mirrored
+from ses_core.synthesis.adversarial_losses import discriminator_loss, generator_loss
 from ses_core.synthesis.gan_networks import (
     binarized,
     build_discriminator,
     build_generator,
-    discriminator_loss,
-    generator_loss,
     slope_penalty,
 )
 from ses_core.synthesis.generator_modules import as_network, keep_free, load_network
@@ -104,7 +103,9 @@ class GanTraining:
 
         judged = self.discriminator(shifted(fake, most=settings.most_shift))
         self.generator_optimiser.zero_grad(set_to_none=True)
-        torch.autograd.backward(generator_loss(judged), inputs=self.generator_weights)
+        torch.autograd.backward(
+            generator_loss(judged, loss="non-saturating"), inputs=self.generator_weights
+        )
         self.generator_optimiser.step()
         for average, weight in self._averages:
             average.lerp_(weight, 1.0 - settings.average_decay)

@@ -7,26 +7,38 @@ import numpy as np
 from numpy.random import Generator
 
 from ses_core.arrays import BoolArray, IntArray
+from ses_core.navigation import NavigationDomain
+from ses_core.recipes import digest_json
 from ses_core.scorecard.distances import clearance_feature, distinct_maps, euclidean
 from ses_core.scorecard.manifolds import manifold_scores
 from ses_core.synthesis.generator_network import GeneratorNetwork
 from ses_core.synthesis_settings import GanSettings
 
 
-def held_out(count: int, *, settings: GanSettings, rng: Generator) -> tuple[IntArray, IntArray]:
-    """Draw which of `count` environments are trained on, and which are held out.
+def held_out(domain: NavigationDomain, *, settings: GanSettings) -> tuple[IntArray, IntArray]:
+    """Choose which environments of a domain are trained on, and which are held out.
 
-    Too few of them would tell nothing: then none is held out.
+    They are chosen by their ids: what yesterday's fit was not taught, today's is not taught
+    either, so a warm start is not judged by what it knows. Too few different ones would tell
+    nothing: then none is held out.
     """
-    size = min(math.floor(settings.heldout_share * count), settings.most_heldout)
+    identities = [environment.environment_id for environment in domain.environments]
+    size = min(math.floor(settings.heldout_share * len(identities)), settings.most_heldout)
     if size < settings.least_heldout:
         size = 0
-    order = rng.permutation(count)
+    order = np.argsort([digest_json([identity]) for identity in identities], kind="stable")
+    kept_back = np.sort(order[:size])
+    different = len(np.unique(domain.cells()[kept_back].reshape(size, -1), axis=0)) if size else 0
+    if different <= settings.coverage_neighbours:
+        size = 0
     return np.sort(order[size:]), np.sort(order[:size])
 
 
 class SnapshotChoice:
-    """Keeps the best of the generators it is shown; without anything held out, the last."""
+    """Keeps the best of the generators it is shown, of equals the later.
+
+    Without anything held out that is the last.
+    """
 
     def __init__(self, heldout: BoolArray, *, settings: GanSettings, rng: Generator) -> None:
         """Take held-out environments (H, 30, 30)."""
@@ -50,7 +62,7 @@ class SnapshotChoice:
 
     @property
     def is_over(self) -> bool:
-        """Whether so many in a row were no better that more are not worth their time."""
+        """Whether so many in a row were worse that more are not worth their time."""
         return self._worse_in_a_row >= self._settings.patience
 
     def consider(self, network: GeneratorNetwork) -> None:
@@ -65,7 +77,8 @@ class SnapshotChoice:
             coverage(self._heldout, one, k=self._settings.coverage_neighbours)
             for one in np.split(drawn, draws)
         )
-        if found > self._best_coverage:
+        # Of equals the later one has been taught for longer.
+        if found >= self._best_coverage:
             self._best, self._best_coverage, self._worse_in_a_row = network, found, 0
         else:
             self._worse_in_a_row += 1

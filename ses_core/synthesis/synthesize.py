@@ -1,6 +1,5 @@
 """From challenging environments to the ones a policy trains in (section III-C)."""
 
-import copy
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -103,28 +102,21 @@ def fit_synthesis(
 ) -> FittedSynthesis:
     """Fit the synthesizer that the settings and the size of the domain call for.
 
-    Where `start` is of another synthesizer or its arrays have other shapes, the fit begins
-    from nothing and is the same as without it. What was done is in the notes.
+    Where `start` is of another synthesizer, the fit begins from nothing and is the same as
+    without it. What was done is in the notes.
 
     Raises:
         SynthesisError: The domain is empty.
     """
     plan = plan_synthesis(settings, available=len(domain.environments))
     synthesizer = make_synthesizer(plan.synthesizer, environments=plan.environments)
-    note = ""
-    if start is not None:
-        if start.fitted.plan.synthesizer == plan.synthesizer:
-            earlier = start.fitted.synthesizer
-            went_on = synthesizer.fit(
-                domain, rng=copy.deepcopy(rng), progress=progress, start=earlier
-            )
-            # A synthesizer may take over only the arrays that fit: that is no going on.
-            if _shapes(went_on) == _shapes(earlier):
-                notes = (*plan.notes, f"went on from the earlier fit {start.name}")
-                return FittedSynthesis(plan=replace(plan, notes=notes), synthesizer=went_on)
-        note = f"began from nothing: the earlier fit {start.name} does not match"
-    fitted = synthesizer.fit(domain, rng=rng, progress=progress)
-    notes = (*plan.notes, note) if note else plan.notes
+    earlier, notes = None, plan.notes
+    if start is not None and start.fitted.plan.synthesizer == plan.synthesizer:
+        earlier = start.fitted.synthesizer
+        notes = (*notes, f"went on from the earlier fit {start.name}")
+    elif start is not None:
+        notes = (*notes, f"began from nothing: the earlier fit {start.name} does not match")
+    fitted = synthesizer.fit(domain, rng=rng, progress=progress, start=earlier)
     return FittedSynthesis(plan=replace(plan, notes=notes), synthesizer=fitted)
 
 
@@ -186,10 +178,6 @@ def _samples(
     cells = fitted.synthesizer.sample(count * attempts, rng=rng, radius=radius)
     for first in range(0, len(cells), count):
         yield cells[first : first + count]
-
-
-def _shapes(fitted: FittedSynthesizer) -> dict[str, tuple[int, ...]]:
-    return {name: array.shape for name, array in fitted.arrays().items()}
 
 
 def _environment(cells: BoolArray, *, method: str) -> NavigationEnvironment:

@@ -116,6 +116,7 @@ def test_people_read_one_line_for_each_row(
         ("real", "damaged", (), "--synthesized: "),
         ("real", "synthesized", ("--policy", "nobody"), "--policy: found no policy 'nobody'"),
         ("real", "synthesized", ("--driven", "-1"), "scorecard.driven"),
+        ("real", "synthesized", ("--training", "{folder}/real"), "--training: found 24 env"),
     ],
 )
 def test_misuse_is_said_in_one_line(
@@ -126,6 +127,7 @@ def test_misuse_is_said_in_one_line(
     options: tuple[str, ...],
     said: str,
 ) -> None:
-    assert run(command(folder, real, synthesized, *options)) == 2
+    given = [option.format(folder=folder) for option in options]
+    assert run(command(folder, real, synthesized, *given)) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert said in line

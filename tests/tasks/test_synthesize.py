@@ -165,3 +165,12 @@ def test_how_the_uncrossable_are_treated_decides_what_is_found(
     other = sample(settings.model_copy(update=changed))
     assert (first.found, again.found, other.found) == (False, True, False)
     assert other.ref != first.ref
+
+
+def test_other_cells_under_the_same_ids_are_another_pool(store: LocalArtifactStore) -> None:
+    first, second = places(store, rooms(40)), places(store, rooms(40, seed=1))
+    assert first != second
+    settings = SynthesisSettings(synthesizer=GanSettings(), environments=5)
+    assert not fit(store, first, settings).found
+    assert not fit(store, second, settings).found
+    assert fit(store, second, settings).found

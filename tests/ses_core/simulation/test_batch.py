@@ -10,6 +10,7 @@ from ses_core.planning.parameters import DWA_FAST, DWA_SLOW
 from ses_core.robot_profile import JACKAL, TURTLEBOT4, LaserProfile
 from ses_core.settings import SimulationSettings
 from ses_core.simulation.batch import BatchSimulator
+from ses_core.simulation.trace import make_trace
 from tests.contracts.simulator import check_simulator
 from tests.simulated import CLEAN, course, drive_out, flawed, hall, kernel, parameters, simulator
 
@@ -249,6 +250,10 @@ def test_misuse_is_refused_in_words() -> None:
         driven.reset(np.array([4]), [course(hall())], np.array([0]))
     with pytest.raises(ValueError, match=r"\(1, 6\), expected \(1, 7\)"):
         driven.advance(np.zeros((1, 6)), 1)
+    for slots, sense_every, beams in ((2, 4, 720), (1, 5, 720), (1, 4, 360)):
+        trace = make_trace(slots, ticks=100, sense_every=sense_every, beams=beams)
+        with pytest.raises(ValueError, match=r"expected \(1, 26, 720\)"):
+            driven.trace_into(trace)
 
 
 def test_the_map_grows_with_what_the_robot_sees() -> None:

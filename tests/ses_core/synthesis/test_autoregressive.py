@@ -150,3 +150,17 @@ def test_a_warm_start_begins_with_the_earlier_weights() -> None:
     network = random_network()
     assert np.allclose(fit(network).window_weight, network.window_weight, atol=1e-6)
     assert not np.allclose(fit(None).window_weight, network.window_weight, atol=0.1)
+
+
+@pytest.mark.parametrize(("plain_share", "cells"), [(0.99, rooms(4)), (0.01, rooms(4))])
+def test_a_batch_holds_some_of_each_kind(plain_share: float, cells: BoolArray) -> None:
+    *_, weights = Examples.of(cells, reach=3).draw(32, plain_share, default_rng(0))
+    assert len(set(weights.tolist())) == 2
+
+
+@pytest.mark.parametrize("is_full", [False, True])
+def test_places_that_are_all_alike_can_be_learned(is_full: bool) -> None:
+    cells = np.full((3, 30, 30), is_full)
+    *_, occupied, weights = Examples.of(cells, reach=3).draw(64, 0.25, default_rng(0))
+    assert np.average(occupied.numpy(), weights=weights.numpy()) == is_full
+    assert weights.sum() == pytest.approx(64)

@@ -8,8 +8,6 @@ from ses_core.synthesis.gan_paper import (
     GanPaper,
     build_discriminator,
     build_generator,
-    discriminator_loss,
-    generator_loss,
     judge,
 )
 from ses_core.synthesis.generator_network import GeneratorNetwork
@@ -49,17 +47,6 @@ def test_discriminator_has_the_layers_of_the_paper() -> None:
         *("256-256", *hidden),
         "256-1",
     ]
-
-
-def test_losses_are_those_of_equation_1() -> None:
-    real_logits = torch.tensor([[0.3], [-1.2]])
-    fake_logits = torch.tensor([[2.0], [0.7]])
-    real, fake = torch.sigmoid(real_logits), torch.sigmoid(fake_logits)
-    value = real.log().mean() + (1.0 - fake).log().mean()
-    assert torch.allclose(discriminator_loss(real_logits, fake_logits), -value)
-    saturating = (1.0 - fake).log().mean()
-    assert torch.allclose(generator_loss(fake_logits, loss="saturating"), saturating)
-    assert torch.allclose(generator_loss(fake_logits, loss="non-saturating"), -fake.log().mean())
 
 
 def test_the_loss_as_printed_is_the_default() -> None:
