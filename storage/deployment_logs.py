@@ -158,7 +158,9 @@ class _LogWriter:
             identity = Identity(key.site, key.robot)
             write_tables(path, content, identity, day=self._day, settings=self._settings.ingest)
         else:
-            write_rosbag(path, content, format=self._format, split_s=self._settings.fleet.split_s)
+            with _whole_log(path) as unfinished:
+                split_s = self._settings.fleet.split_s
+                write_rosbag(unfinished, content, format=self._format, split_s=split_s)
         write_if_absent(path.with_name(f"{path.name}.done"), b"")
         numbers = tuple(deployment.number for deployment in drives)
         return FleetLog(path=path, numbers=numbers, site=key.site, robot=key.robot)
@@ -184,9 +186,10 @@ def write_tables(
         profile=profile.name,
         velocity_source=velocity_source(recording, settings),
     )
-    with _whole_folder(path) as folder:
+    with _whole_log(path) as unfinished:
+        unfinished.mkdir()
         write_ingested(
-            folder,
+            unfinished,
             description,
             recording,
             resample(recording, profile=profile, settings=settings),
@@ -195,17 +198,24 @@ def write_tables(
 
 
 @contextmanager
-def _whole_folder(path: Path) -> Iterator[Path]:
-    """Give a hidden folder to fill, which gets its name when it is whole: inboxes pass it over."""
+def _whole_log(path: Path) -> Iterator[Path]:
+    """Give a place for a file or folder, which is moved to its own when it is whole.
+
+    The place lies in a hidden folder, which inboxes pass over, and has the log's name already:
+    ROS 2 bags name the files in them after themselves.
+    """
     make_folder(path.parent)
     hidden = temporary_name(path)
     hidden.mkdir()
     try:
-        yield hidden
-        for file in hidden.iterdir():
-            sync_file(file)
-        sync_folder(hidden)
-        hidden.rename(path)
+        unfinished = hidden / path.name
+        yield unfinished
+        for file in (unfinished, *unfinished.glob("*")):
+            if file.is_file():
+                sync_file(file)
+        if unfinished.is_dir():
+            sync_folder(unfinished)
+        unfinished.rename(path)
     finally:
         shutil.rmtree(hidden, ignore_errors=True)
     sync_folder(path.parent)

@@ -2,7 +2,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, date, datetime
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from ses_core.occupancy import OccupancyGrid
 from ses_core.robot_profile import GENERIC
 from ses_core.settings import DecoderLimits, IngestSettings, Settings, SimulationSettings
 from ses_core.worlds.deployment import Deployment
-from storage import trajectory_tables
+from storage import rosbag_writer, trajectory_tables
 from storage.deployment_logs import FleetFormat, FleetLog, write_deployments
 from storage.inbox import InboxScan, scan_inbox
 from storage.inbox_ledger import InboxLedger
@@ -316,6 +316,29 @@ def test_tables_that_were_never_finished_are_no_upload(
     assert {(scan.new, scan.waiting) for scan in found} == {((), ())}
     assert not list(tmp_path.rglob("*.parquet"))
     assert len(_write(tmp_path, "tables")) == len(_look_into(tmp_path).new) == 3
+
+
+@pytest.mark.parametrize("log_format", ["mcap", "db3", "bag"])
+def test_bags_that_were_never_finished_are_no_upload(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log_format: FleetFormat
+) -> None:
+    found: list[InboxScan] = []
+
+    def killed(streams: object) -> Iterator[object]:
+        yield from islice(in_time_order(streams), 50)
+        assert [file for file in tmp_path.rglob("*") if file.is_file()]
+        found.append(_look_into(tmp_path))
+        raise KeyboardInterrupt
+
+    in_time_order: Any = rosbag_writer._in_time_order
+    with monkeypatch.context() as patch:
+        patch.setattr(rosbag_writer, "_in_time_order", killed)
+        with pytest.raises(KeyboardInterrupt):
+            _write(tmp_path, log_format)
+    assert {(scan.new, scan.waiting) for scan in found} == {((), ())}
+    assert not [file for file in tmp_path.rglob("*") if file.is_file()]
+    assert len(_look_into(tmp_path).new) == 0
+    assert len(_write(tmp_path, log_format)) == len(_look_into(tmp_path).new) == 4
 
 
 def _look_into(inbox: Path) -> InboxScan:
