@@ -16,8 +16,7 @@ def go_on(recipe: Recipe, *, store: LocalArtifactStore, anew: bool = False) -> R
     """Make the earlier fit that a fit goes on from an input of its recipe.
 
     What was fitted to these environments already is not fitted again, whatever it went on from.
-    Else it is the newest fit of the same synthesizer, to other environments, with another seed
-    or for another number of them.
+    Else it is the newest fit of the same synthesizer, to other environments or with another seed.
 
     Args:
         recipe: Asks for a fit from nothing.

@@ -10,7 +10,7 @@ from prefect.cache_policies import NO_CACHE
 
 from ses_core.recipes import ArtifactRef, Recipe, settings_json
 from ses_core.robot_profile import RobotProfile
-from ses_core.synthesis.synthesize import can_go_on, draw_environments, fit_synthesis
+from ses_core.synthesis.synthesize import draw_environments, fit_synthesis, is_training
 from ses_core.synthesis_settings import SynthesisSettings
 from storage.artifact_store import LocalArtifactStore
 from storage.earlier_fits import earlier_fit, go_on
@@ -58,16 +58,17 @@ def fit_synthesizer(
     fit is an input of the recipe, so a warm fit never answers for one from nothing.
     """
     pool = read_pool(store.path(selection))
+    trains = is_training(settings, available=len(pool.environments))
     recipe = Recipe(
         FIT,
         {
             "pool": domain_digest(pool),
             "synthesizer": settings_json(settings.synthesizer),
-            "environments": settings.environments,
+            "environments": None if trains else settings.environments,
             "seed": settings.seed,
         },
     )
-    if settings.warm_start and can_go_on(settings, available=len(pool.environments)):
+    if settings.warm_start and trains:
         recipe = go_on(recipe, store=store, anew=anew)
 
     def build(directory: Path) -> None:

@@ -83,8 +83,11 @@ def synthesize(
     return draw_environments(fitted, domain, settings=settings, target=target, rng=sample_rng)
 
 
-def can_go_on(settings: SynthesisSettings, *, available: int) -> bool:
-    """Tell whether the fit to `available` environments can begin where an earlier one ended.
+def is_training(settings: SynthesisSettings, *, available: int) -> bool:
+    """Tell whether the fit to `available` environments is a training.
+
+    A training can begin where an earlier one ended, and however many environments are wanted,
+    it is the same.
 
     Raises:
         SynthesisError: There is nothing to learn from.
@@ -134,9 +137,15 @@ def draw_environments(
     Environments that equal one of the domain it was fitted to are counted and traced.
     """
     plan = fitted.plan
+    if isinstance(plan.synthesizer, LearnedSettings):
+        # It was perhaps fitted when another number was wanted.
+        plan = replace(plan, environments=settings.environments)
     taking = Taking(settings=settings, count=plan.environments, radius=target.inscribed_radius_m)
     for samples in _samples(
-        fitted, attempts=settings.attempts, radius=target.inscribed_radius_m, rng=rng
+        replace(fitted, plan=plan),
+        attempts=settings.attempts,
+        radius=target.inscribed_radius_m,
+        rng=rng,
     ):
         taking.look_at(samples)
         if taking.is_complete:

@@ -174,3 +174,13 @@ def test_other_cells_under_the_same_ids_are_another_pool(store: LocalArtifactSto
     assert not fit(store, first, settings).found
     assert not fit(store, second, settings).found
     assert fit(store, second, settings).found
+
+
+def test_another_number_of_environments_is_drawn_from_the_same_fit(
+    store: LocalArtifactStore,
+) -> None:
+    pool = places(store, rooms(40))
+    more = COLD.model_copy(update={"environments": 9})
+    first, second = fit(store, pool, COLD), fit(store, pool, more)
+    assert second.found
+    assert second.ref == first.ref

@@ -60,10 +60,11 @@ def draw(
     attempts: int = 20,
     uncrossable: Uncrossable = "repair",
     most: int = 30,
+    fitted_for: int | None = None,
 ) -> SynthesisResult:
     return draw_environments(
         FittedSynthesis(
-            plan=SynthesisPlan(synthesizer=GanSettings(), environments=environments),
+            plan=SynthesisPlan(synthesizer=GanSettings(), environments=fitted_for or environments),
             synthesizer=source,
         ),
         domain_of(rooms(2, seed=9)),
@@ -194,3 +195,10 @@ def test_a_recorded_place_is_repaired_too_and_is_no_copy_then() -> None:
     )
     assert result.repaired == 2
     assert result.copies == {}
+
+
+def test_as_many_are_drawn_from_a_training_as_are_wanted_now() -> None:
+    source = Source(rooms(60), is_endless=True)
+    result = draw(source, environments=9, fitted_for=5)
+    assert len(result.environments.environments) == 9
+    assert not any("instead of" in note for note in result.notes)

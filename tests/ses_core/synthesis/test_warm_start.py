@@ -5,7 +5,7 @@ import pytest
 from numpy.random import default_rng
 
 from ses_core.synthesis.sizes import SynthesisPlan
-from ses_core.synthesis.synthesize import EarlierFit, FittedSynthesis, can_go_on, fit_synthesis
+from ses_core.synthesis.synthesize import EarlierFit, FittedSynthesis, fit_synthesis, is_training
 from ses_core.synthesis_settings import (
     AutoregressiveSettings,
     GanPaperSettings,
@@ -72,8 +72,8 @@ def test_what_does_not_match_is_begun_from_nothing_and_said() -> None:
         (IdentitySettings(), 30, False),
     ],
 )
-def test_only_a_training_can_go_on(
+def test_only_a_training_is_training(
     synthesizer: SynthesizerSettings, available: int, expected: bool
 ) -> None:
     settings = SynthesisSettings(synthesizer=synthesizer)
-    assert can_go_on(settings, available=available) is expected
+    assert is_training(settings, available=available) is expected
