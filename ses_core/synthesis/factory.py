@@ -8,15 +8,17 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ses_core.arrays import BoolArray
 from ses_core.errors import SynthesisError
 from ses_core.protocols import FittedSynthesizer, Synthesizer
 from ses_core.synthesis.autoregressive_network import autoregressive_from_arrays
+from ses_core.synthesis.fixed_order import FixedOrder, order_from_arrays
 from ses_core.synthesis.generator_network import network_from_arrays
-from ses_core.synthesis.identity import Identity, identity_from_arrays
-from ses_core.synthesis.medoids import Medoids, medoids_from_arrays
-from ses_core.synthesis.mirror import Mirror, mirror_from_arrays
+from ses_core.synthesis.keeping import Keeping
+from ses_core.synthesis.medoids import Medoids
+from ses_core.synthesis.mirror import FittedMirror
 from ses_core.synthesis.pca_selection import selection_from_arrays
-from ses_core.synthesis.random_sampling import RandomSampling, sampling_from_arrays
+from ses_core.synthesis.random_sampling import FittedRandomSampling
 from ses_core.synthesis_settings import (
     AutoregressiveSettings,
     GanPaperSettings,
@@ -37,10 +39,10 @@ _REBUILDERS: dict[str, Callable[[Arrays], FittedSynthesizer]] = {
     "gan": network_from_arrays,
     "pca-paper": selection_from_arrays,
     "pca": selection_from_arrays,
-    "rs": sampling_from_arrays,
-    "medoids": medoids_from_arrays,
-    "identity": identity_from_arrays,
-    "mirror": mirror_from_arrays,
+    "rs": lambda arrays: FittedRandomSampling(cells=_cells(arrays)),
+    "medoids": order_from_arrays,
+    "identity": order_from_arrays,
+    "mirror": lambda arrays: FittedMirror(cells=_cells(arrays)),
     "autoregressive": autoregressive_from_arrays,
 }
 
@@ -65,13 +67,13 @@ def make_synthesizer(settings: SynthesizerSettings, *, environments: int) -> Syn
 
             return PcaKmeans(settings, environments=environments)
         case RandomSamplingSettings():
-            return RandomSampling()
+            return Keeping(lambda cells: FittedRandomSampling(cells=cells))
         case MedoidsSettings():
             return Medoids(environments=environments)
         case IdentitySettings():
-            return Identity()
+            return Keeping(lambda cells: FixedOrder(cells=cells))
         case MirrorSettings():
-            return Mirror()
+            return Keeping(lambda cells: FittedMirror(cells=cells))
         case AutoregressiveSettings():
             from ses_core.synthesis.autoregressive import Autoregressive
 
@@ -94,3 +96,7 @@ def rebuild_synthesizer(method: str, arrays: Arrays) -> FittedSynthesizer:
         raise SynthesisError(
             f"found no array {error} among those of {method}: {sorted(arrays)}"
         ) from error
+
+
+def _cells(arrays: Arrays) -> BoolArray:
+    return np.asarray(arrays["cells"], dtype=np.bool_)

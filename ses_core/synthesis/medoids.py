@@ -4,18 +4,17 @@ A control that the paper lacks: no component and no centre stands between, dista
 number of cells in which two environments differ.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from ses_core.arrays import BoolArray
 from ses_core.navigation import NavigationDomain
 from ses_core.protocols import FittedSynthesizer
 from ses_core.scorecard.distances import differing_cells, distinct_maps
-from ses_core.synthesis.fixed_order import FixedOrder, order_from_arrays, round_the_clusters
+from ses_core.synthesis.fixed_order import FixedOrder, round_the_clusters
 from ses_core.synthesis.k_medoids import Int16Array, k_medoids
 
 _BLOCK = 512
@@ -57,11 +56,6 @@ class Medoids:
             sizes=np.bincount(found.nearest, weights=weights).astype(np.float64),
         )
         return FixedOrder(cells=maps.cells[order])
-
-
-def medoids_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> FixedOrder:
-    """Rebuild a fit from its `arrays()`."""
-    return order_from_arrays(arrays)
 
 
 def _distance_matrix(cells: BoolArray) -> Int16Array:

@@ -8,7 +8,7 @@ across all. That the fleet found one of them hard does not say that the way back
 meets the same gap from its other side, is hard as well.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,6 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from ses_core.arrays import BoolArray
-from ses_core.navigation import NavigationDomain
-from ses_core.protocols import FittedSynthesizer
 from ses_core.scorecard.distances import distinct_maps
 
 
@@ -46,28 +44,6 @@ class FittedMirror:
     def arrays(self) -> Mapping[str, NDArray[np.generic]]:
         """Give what rebuilds it."""
         return {"cells": self.cells}
-
-
-@dataclass(frozen=True, slots=True)
-class Mirror:
-    """Learns nothing: it keeps the environments."""
-
-    def fit(
-        self,
-        domain: NavigationDomain,
-        *,
-        rng: Generator,  # noqa: ARG002  (the seam's: nothing is drawn here)
-        progress: Callable[[float], None],
-        start: FittedSynthesizer | None = None,  # noqa: ARG002  (the seam's: nothing is learned)
-    ) -> FittedMirror:
-        """Keep the domain's cells."""
-        progress(1.0)
-        return FittedMirror(cells=domain.cells())
-
-
-def mirror_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> FittedMirror:
-    """Rebuild a fit from its `arrays()`."""
-    return FittedMirror(cells=np.asarray(arrays["cells"], dtype=np.bool_))
 
 
 def four_courses(cells: BoolArray) -> BoolArray:

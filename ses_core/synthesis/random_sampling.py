@@ -1,6 +1,6 @@
 """SES-RS: the uniform distribution over the challenging environments (section III-C)."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +8,6 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from ses_core.arrays import BoolArray
-from ses_core.navigation import NavigationDomain
-from ses_core.protocols import FittedSynthesizer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,25 +34,3 @@ class FittedRandomSampling:
     def arrays(self) -> Mapping[str, NDArray[np.generic]]:
         """Give what rebuilds it."""
         return {"cells": self.cells}
-
-
-@dataclass(frozen=True, slots=True)
-class RandomSampling:
-    """Learns nothing: it keeps the environments."""
-
-    def fit(
-        self,
-        domain: NavigationDomain,
-        *,
-        rng: Generator,  # noqa: ARG002  (the seam's: nothing is drawn here)
-        progress: Callable[[float], None],
-        start: FittedSynthesizer | None = None,  # noqa: ARG002  (the seam's: nothing is learned)
-    ) -> FittedRandomSampling:
-        """Keep the domain's cells."""
-        progress(1.0)
-        return FittedRandomSampling(cells=domain.cells())
-
-
-def sampling_from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> FittedRandomSampling:
-    """Rebuild a fit from its `arrays()`."""
-    return FittedRandomSampling(cells=np.asarray(arrays["cells"], dtype=np.bool_))

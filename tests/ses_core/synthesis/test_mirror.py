@@ -6,8 +6,10 @@ from numpy.random import default_rng
 from ses_core.arrays import BoolArray
 from ses_core.occupancy import environment_cell_centres, from_drawing
 from ses_core.robot_profile import JACKAL
-from ses_core.synthesis.mirror import FittedMirror, Mirror, four_courses
+from ses_core.synthesis.factory import make_synthesizer
+from ses_core.synthesis.mirror import FittedMirror, four_courses
 from ses_core.synthesis.traversability import traversable
+from ses_core.synthesis_settings import MirrorSettings
 from tests.ses_core.synthesis.places import domain_of, rooms, walled_off
 
 
@@ -98,5 +100,7 @@ def test_what_can_be_crossed_can_be_crossed_in_all_four_courses() -> None:
 
 def test_the_recorded_places_are_what_is_stored() -> None:
     cells = rooms(3)
-    fitted = Mirror().fit(domain_of(cells), rng=default_rng(0), progress=lambda _: None)
+    fitted = make_synthesizer(MirrorSettings(), environments=1).fit(
+        domain_of(cells), rng=default_rng(0), progress=lambda _: None
+    )
     assert np.array_equal(fitted.arrays()["cells"], cells)
