@@ -100,7 +100,7 @@ class Simulator(Protocol):
         ...
 
     def advance(self, parameters: FloatArray, ticks: int) -> None:
-        """Run control ticks under planner parameters (N, 7)."""
+        """Run control ticks under planner parameters (N, 8)."""
         ...
 
     def trace_into(self, trace: Trace) -> None:
@@ -205,7 +205,7 @@ class Policy(Protocol):
     """Sets planner parameters from observations."""
 
     def act(self, observations: FloatArray) -> FloatArray:
-        """Map observations (N, D) to planner parameters (N, 7), deterministically."""
+        """Map observations (N, D) to planner parameters (N, 8), deterministically."""
         ...
 
 

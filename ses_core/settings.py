@@ -154,6 +154,11 @@ class TrainingSettings(SettingsModel):
 
     algorithm: Literal["ppo", "td3", "sac"] = Field("ppo", description="stable-baselines3's.")
     steps: int = Field(100_000, ge=1, description="Decisions trained.")
+    action: Literal["seven", "eight"] | None = Field(
+        None,
+        description="What is set: seven parameters, or with the weight of obstacles eight; else "
+        "what the policy gone on from sets, or seven.",
+    )
     decision_period_s: float | None = Field(
         None,
         gt=0,

@@ -16,7 +16,8 @@ from ses_core.evaluation.episodes import Episode
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.evaluation.trials import Trial, finished_episode
 from ses_core.geometry import Pose2D, from_frame
-from ses_core.learning.policies import initial_parameters, observer_for, policy_ticks
+from ses_core.learning.policies import observer_for, policy_ticks
+from ses_core.planning.parameters import initial_parameters
 from ses_core.protocols import Policy, Simulator
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
@@ -68,7 +69,7 @@ class EpisodeTrace:
         poses: True poses (K, 3) [m, m, rad].
         velocities: Measured (K, 2) [m/s, rad/s].
         commands: Given by the planner in the tick that ended here (K, 2) [m/s, rad/s].
-        parameters: Planner parameters (K, 7) in force from here on; they change once a second.
+        parameters: Planner parameters (K, 8) in force from here on; they change once a second.
     """
 
     drive: Drive
@@ -215,12 +216,12 @@ def _ticks(drive: Drive, simulator: Simulator) -> Iterator[FloatArray]:
     """Drive tick by tick, stopping at the start and after each one.
 
     Yields:
-        The planner parameters (7,) in force from here on.
+        The planner parameters (8,) in force from here on.
     """
     observer = observer_for(drive.policy, drive.profile)
     per_decision = policy_ticks(drive.policy, simulator.time_step)
     simulator.reset(np.arange(1), [drive.trial.place.task], np.array([drive.trial.seed]))
-    parameters = initial_parameters(1)
+    parameters = initial_parameters(1, drive.profile)
     while True:
         observations = observer.observe(simulator.scans(), simulator.state(), parameters)
         parameters = drive.policy.act(observations)

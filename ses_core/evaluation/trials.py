@@ -9,9 +9,10 @@ import numpy as np
 
 from ses_core.evaluation.episodes import BARN_SPEED_MPS, Episode, barn_score
 from ses_core.evaluation.outcomes import EpisodeOutcome
-from ses_core.learning.policies import initial_parameters, observer_for, policy_ticks
+from ses_core.learning.policies import observer_for, policy_ticks
 from ses_core.navigation import NavigationTask
 from ses_core.planning.global_planner import optimal_path_length
+from ses_core.planning.parameters import initial_parameters
 from ses_core.protocols import Policy, Simulator, SimulatorState
 from ses_core.recipes import digest_json
 from ses_core.robot_profile import RobotProfile
@@ -159,7 +160,7 @@ def _drive(
     ticks = policy_ticks(policy, simulator.time_step)
     waiting = deque(range(len(schedule)))
     driven = np.full(simulator.slots, -1)
-    parameters = initial_parameters(simulator.slots)
+    parameters = initial_parameters(simulator.slots, profile)
     episodes: dict[int, Episode] = {}
     idle = np.arange(simulator.slots)
     while len(episodes) < len(schedule):
@@ -170,7 +171,7 @@ def _drive(
             trials = [schedule[number] for number in driven[slots]]
             seeds = np.array([trial.seed for trial in trials], dtype=np.int64)
             simulator.reset(slots, [trial.place.task for trial in trials], seeds)
-            parameters[slots] = initial_parameters(len(slots))
+            parameters[slots] = initial_parameters(len(slots), profile)
         observations = observer.observe(simulator.scans(), simulator.state(), parameters)
         parameters = policy.act(observations)
         simulator.advance(parameters, ticks)

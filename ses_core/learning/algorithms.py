@@ -21,7 +21,6 @@ from torch import nn
 
 from ses_core.arrays import Float32Array
 from ses_core.learning.policies import ParameterPolicy
-from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.settings import TrainingSettings
 
 _ROLLOUT = 1024
@@ -78,9 +77,8 @@ class _SquashedMeanPolicy(ActorCriticPolicy):
 class _FadingNoise(NormalActionNoise):
     """Exploration whose standard deviation falls from one value to another."""
 
-    def __init__(self, first: float, last: float, *, decisions: int) -> None:
-        shape = (len(PARAMETER_NAMES),)
-        super().__init__(mean=np.zeros(shape), sigma=np.full(shape, first))
+    def __init__(self, first: float, last: float, *, length: int, decisions: int) -> None:
+        super().__init__(mean=np.zeros(length), sigma=np.full(length, first))
         self._first, self._last, self._decisions, self._made = first, last, decisions, 0
 
     def __call__(self) -> NDArray[Any]:
@@ -203,10 +201,16 @@ def _make_td3(
         "MlpPolicy",
         env,
         **_off_policy(env, hidden, settings, rounds=rounds, rate=1e-4),
-        action_noise=_FadingNoise(*_NOISE, decisions=rounds),
+        action_noise=_FadingNoise(*_NOISE, length=_action_length(env), decisions=rounds),
         policy_delay=2,
     )
     return learner, rounds * env.num_envs
+
+
+def _action_length(env: VecEnv) -> int:
+    shape = env.action_space.shape
+    assert shape is not None  # a Box has one
+    return shape[0]
 
 
 def _make_sac(

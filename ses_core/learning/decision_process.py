@@ -8,12 +8,13 @@ from numpy.random import Generator
 
 from ses_core.arrays import Float32Array, FloatArray, IntArray
 from ses_core.geometry import Pose2D, compose
+from ses_core.learning.action import ActionSpec
 from ses_core.learning.observation import ObservationSpec, make_observer
-from ses_core.learning.policies import DECISION_PERIOD_S, decision_ticks, initial_parameters
+from ses_core.learning.policies import DECISION_PERIOD_S, decision_ticks
 from ses_core.learning.reward import nearness, reward_of, rewards, way_made
 from ses_core.navigation import NavigationTask
 from ses_core.occupancy import occupied_at
-from ses_core.planning.parameters import decode_action
+from ses_core.planning.parameters import initial_parameters
 from ses_core.protocols import Simulator
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import TrainingSettings
@@ -48,6 +49,7 @@ class DecisionProcess:
         *,
         tasks: Sequence[NavigationTask],
         observation: ObservationSpec,
+        action: ActionSpec,
         profile: RobotProfile,
         settings: TrainingSettings,
         decision_period: float = DECISION_PERIOD_S,
@@ -59,6 +61,7 @@ class DecisionProcess:
             simulator: N slots; closed by whoever made it.
             tasks: What episodes are drawn from.
             observation: What is seen.
+            action: What is set.
             profile: The robot.
             settings: Reward and jitter.
             decision_period: Driving between two decisions [s].
@@ -68,14 +71,15 @@ class DecisionProcess:
             raise ValueError("found no task to train in, expected at least one")
         self.simulator = simulator
         self.observation = observation
+        self.action = action
         self._tasks = list(tasks)
         self._shares = None if weights is None else weights / weights.sum()
-        self._observer = make_observer(observation, profile)
+        self._observer = make_observer(observation, profile, action=action)
         self._profile = profile
         self._settings = settings
         self._reward = reward_of(settings)
         self._ticks = decision_ticks(decision_period, simulator.time_step)
-        self._parameters = initial_parameters(simulator.slots)
+        self._parameters = initial_parameters(simulator.slots, profile)
         self._starts = np.zeros((simulator.slots, 2))
         self._way = np.zeros(simulator.slots)
 
@@ -89,7 +93,7 @@ class DecisionProcess:
             for number in drawn
         ]
         self.simulator.reset(slots, tasks, rng.integers(2**31, size=len(slots)))
-        self._parameters[slots] = initial_parameters(len(slots))
+        self._parameters[slots] = initial_parameters(len(slots), self._profile)
         state = self.simulator.state()
         self._starts[slots] = state.poses[slots, :2]
         self._way[slots] = way_made(self._reward, state, self._starts)[slots]
@@ -102,8 +106,8 @@ class DecisionProcess:
         return observations.astype(np.float32)
 
     def decide(self, actions: FloatArray) -> Decision:
-        """Set parameters from actions (N, 7) in [-1, 1] and drive until the next decision."""
-        self._parameters = decode_action(np.asarray(actions, dtype=np.float64))
+        """Set parameters from actions (N, A) in [-1, 1] and drive until the next decision."""
+        self._parameters = self.action.decode(np.asarray(actions, dtype=np.float64))
         self.simulator.advance(self._parameters, self._ticks)
         state = self.simulator.state()
         before, self._way = self._way, way_made(self._reward, state, self._starts)

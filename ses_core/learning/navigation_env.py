@@ -9,11 +9,11 @@ from gymnasium.spaces import Box, Space
 
 from ses_core.arrays import Float32Array, FloatArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
+from ses_core.learning.action import ACTIONS, DEFAULT_ACTION, ActionSpec
 from ses_core.learning.decision_process import DecisionProcess
 from ses_core.learning.observation import ObservationSpec, observation_for
 from ses_core.learning.policies import DECISION_PERIOD_S
 from ses_core.navigation import NavigationTask
-from ses_core.planning.parameters import PARAMETER_NAMES
 from ses_core.protocols import Simulator
 from ses_core.robot_profile import JACKAL, RobotProfile
 from ses_core.settings import TrainingSettings
@@ -21,14 +21,15 @@ from ses_core.settings import TrainingSettings
 _FIRST_SLOT = np.zeros(1, dtype=np.int64)
 
 
-def observation_space(spec: ObservationSpec) -> Space[Float32Array]:
+def observation_space(spec: ObservationSpec, action: ActionSpec) -> Space[Float32Array]:
     """Give the bounds of an observation as a space."""
-    return cast("Space[Float32Array]", Box(spec.low(), spec.high(), dtype=np.float32))
+    high = spec.bounds(action)
+    return cast("Space[Float32Array]", Box(-high, high, dtype=np.float32))
 
 
-def action_space() -> Space[Float32Array]:
+def action_space(action: ActionSpec) -> Space[Float32Array]:
     """Give the space of actions: every parameter scaled to [-1, 1]."""
-    box = Box(-1.0, 1.0, shape=(len(PARAMETER_NAMES),), dtype=np.float32)
+    box = Box(-1.0, 1.0, shape=(action.length,), dtype=np.float32)
     return cast("Space[Float32Array]", box)
 
 
@@ -38,14 +39,14 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
     ## Description
     A robot drives from a start to a goal through a world it does not know, under a whole
     navigation stack: laser, costmap, global plan, DWA local planner. Every `decision_period_s`
-    of the settings, by default once per second, the agent sets seven of the planner's parameters
+    of the settings, by default once per second, the agent sets some of the planner's parameters
     (APPLR; section IV-A of the paper). One name, the `preset` of the settings, chooses what is
     seen and what is rewarded: `default` is ours, `authors` is that of the SES authors' code
     (ros_jackal), `paper` is that of APPLR: the paper prints neither and refers to APPLR, whose
     own repository the values are from.
 
     ## Action Space
-    `Box(-1, 1, (7,), float32)`, mapped linearly to
+    `Box(-1, 1, (A,), float32)`, mapped to these; A is 7 or, with the `action` "eight", 8
 
     | # | parameter | -1 | +1 | unit |
     | --- | --- | --- | --- | --- |
@@ -56,6 +57,7 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
     | 4 | `path_distance_bias` | 0.1 | 1.5 | per m |
     | 5 | `goal_distance_bias` | 0.1 | 2.0 | per m |
     | 6 | `inflation_radius` | 0.1 | 0.6 | m |
+    | 7 | `occdist_scale`, linear in its logarithm | 0.001 | 0.2 | per cost |
 
     ## Observation Space
     `Box((D,), float32)`; a row that a preset lacks is left out, and the rest moves up.
@@ -65,8 +67,8 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
     | nearest laser reading per sector, right to left | -0.5 | 0.5 | 120 | 720 | 720 |
     | angle to the local goal, 1 m ahead on the plan | -0.5 | 0.5 | 1 | 1 | 1 |
     | straight distance to the goal, 10 m at most | -0.5 | 0.5 | 1 | | |
-    | parameters in force | -1 | 1 | 7 | | 7 |
-    | D | | | 129 | 721 | 728 |
+    | parameters in force | -1 | 1 | A | | A |
+    | D for A = 7 | | | 129 | 721 | 728 |
 
     Readings r [m] up to c are scaled to r / c - 1/2; c is 4 m in `default`, 2 m in the others.
     The sectors span what the robot's laser sees: 270 degrees on a Jackal, 360 on a TurtleBot 4.
@@ -120,12 +122,14 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
             raise ValueError(f"simulator has {simulator.slots} slots, expected 1")
         settings = settings or TrainingSettings()
         observation = observation or observation_for(settings.preset, profile)
-        self.observation_space = observation_space(observation)
-        self.action_space = action_space()
+        action = ACTIONS[settings.action or DEFAULT_ACTION]
+        self.observation_space = observation_space(observation, action)
+        self.action_space = action_space(action)
         self._process = DecisionProcess(
             simulator,
             tasks=tasks,
             observation=observation,
+            action=action,
             profile=profile,
             settings=settings,
             decision_period=settings.decision_period_s or DECISION_PERIOD_S,
@@ -141,7 +145,7 @@ class NavigationEnv(gymnasium.Env[Float32Array, Float32Array]):
         return self._process.observe()[0], {}
 
     def step(self, action: Float32Array) -> tuple[Float32Array, float, bool, bool, dict[str, Any]]:
-        """Drive until the next decision under the parameters that an action (7,) stands for."""
+        """Drive until the next decision under the parameters that an action (A,) stands for."""
         decision = self._process.decide(np.asarray(action, dtype=np.float64)[None])
         outcome = EpisodeOutcome(int(decision.outcomes[0]))
         info = {"outcome": outcome.name.lower(), "time": float(decision.times[0])}

@@ -7,7 +7,7 @@ Observation (D,), in this order:
 | nearest reading of each sector, right to left | S | m, up to `laser_clip_m` | [-0.5, 0.5] |
 | angle to the local goal, 1 m ahead on the global plan | 1 | rad, (-pi, pi] | [-0.5, 0.5] |
 | straight distance to the goal, if asked for | 1 | m, up to `goal_clip_m` | [-0.5, 0.5] |
-| planner parameters in force, if asked for | 7 | own bounds | [-1, 1] |
+| planner parameters in force that it sets, if asked for | A | own bounds | [-1, 1] |
 
 The S sectors are fixed in the robot's frame, so that a policy does not depend on how many beams a
 laser has or how it is mounted. A reading that is not finite or below the laser's least range
@@ -21,7 +21,7 @@ from pydantic import Field, model_validator
 
 from ses_core.arrays import Float32Array, FloatArray, IntArray
 from ses_core.geometry import wrap_angles
-from ses_core.planning.parameters import PARAMETER_NAMES, encode_parameters
+from ses_core.learning.action import ActionSpec
 from ses_core.protocols import SimulatorState
 from ses_core.robot_profile import LaserProfile, RobotProfile
 from ses_core.settings_model import SettingsModel
@@ -49,21 +49,16 @@ class ObservationSpec(SettingsModel):
             )
         return self
 
-    @property
-    def length(self) -> int:
-        """D, the length of an observation."""
-        parameters = len(PARAMETER_NAMES) if self.has_parameters else 0
+    def length(self, action: ActionSpec) -> int:
+        """Give D, the length of an observation of a policy that sets the action's parameters."""
+        parameters = action.length if self.has_parameters else 0
         return self.sectors + 1 + (self.goal_clip_m is not None) + parameters
 
-    def low(self) -> Float32Array:
-        """Lower bounds (D,)."""
-        return -self.high()
-
-    def high(self) -> Float32Array:
-        """Upper bounds (D,)."""
-        bounds = np.full(self.length, 0.5, dtype=np.float32)
+    def bounds(self, action: ActionSpec) -> Float32Array:
+        """Give the upper bounds (D,); the lower ones are their negatives."""
+        bounds = np.full(self.length(action), 0.5, dtype=np.float32)
         if self.has_parameters:
-            bounds[-len(PARAMETER_NAMES) :] = 1.0
+            bounds[-action.length :] = 1.0
         return bounds
 
 
@@ -104,12 +99,14 @@ class Observer:
     """An observation's layout applied to one laser.
 
     Attributes:
+        action: What the policy sets, for the parameters in force.
         beams: (sectors, K) beam numbers of each sector, repeated to the longest; number B, one
             past the last beam, stands for "no beam looks there" and reads as nothing in sight.
         least_range: Shorter readings mean that nothing came back [m].
     """
 
     spec: ObservationSpec
+    action: ActionSpec
     beams: IntArray
     least_range: float
 
@@ -125,7 +122,7 @@ class Observer:
     def observe(
         self, scans: Float32Array, state: SimulatorState, parameters: FloatArray
     ) -> FloatArray:
-        """Build observations (N, D) from scans (N, B) [m], state and parameters (N, 7) in force."""
+        """Build observations (N, D) from scans (N, B) [m], state and parameters (N, 8) in force."""
         clip = self.spec.laser_clip_m
         ahead = state.local_goals
         parts = [
@@ -137,11 +134,11 @@ class Observer:
             away = np.linalg.norm(state.goals - state.odometry[:, :2], axis=1, keepdims=True)
             parts.append(np.minimum(away, self.spec.goal_clip_m) / self.spec.goal_clip_m - 0.5)
         if self.spec.has_parameters:
-            parts.append(encode_parameters(parameters))
+            parts.append(self.action.encode(parameters))
         return np.hstack(parts)
 
 
-def make_observer(spec: ObservationSpec, profile: RobotProfile) -> Observer:
+def make_observer(spec: ObservationSpec, profile: RobotProfile, *, action: ActionSpec) -> Observer:
     """Assign the beams of a robot's laser to the sectors of an observation."""
     laser = profile.laser
     angles = _beam_angles(laser)
@@ -162,7 +159,7 @@ def make_observer(spec: ObservationSpec, profile: RobotProfile) -> Observer:
         distances = np.abs(wrap_angles(angles - centres[number]))
         if distances.min() <= spacing:
             beams[number] = int(distances.argmin())
-    return Observer(spec=spec, beams=beams, least_range=laser.range_min_m)
+    return Observer(spec=spec, action=action, beams=beams, least_range=laser.range_min_m)
 
 
 def goal_distances(state: SimulatorState) -> FloatArray:

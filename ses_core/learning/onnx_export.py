@@ -7,9 +7,9 @@ Inputs, float32, all of one robot or of N:
 | `scan` | (N, B) | m, as the laser gives them; inf or NaN where nothing came back |
 | `goal_angle` | (N, 1) | rad, to the local goal 1 m ahead on the plan, in the robot's frame |
 | `goal_distance` | (N, 1) | m, straight to the goal; only if the policy sees it |
-| `parameters` | (N, 7) | own units, the parameters in force; only if the policy sees them |
+| `parameters` | (N, A) | own units, what it sets as in force; only if the policy sees it |
 
-Output: `next_parameters` (N, 7) in their own units. Pooling, clipping, scaling and decoding are
+Output: `next_parameters` (N, A) in their own units. Pooling, clipping, scaling and decoding are
 inside, so that a robot needs nothing of this project.
 """
 
@@ -20,9 +20,9 @@ import onnx
 from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, ValueInfoProto, helper, numpy_helper
 
+from ses_core.learning.action import ActionSpec
 from ses_core.learning.observation import Observer
-from ses_core.learning.policies import ParameterPolicy
-from ses_core.planning.parameters import PARAMETER_HIGH, PARAMETER_LOW, PARAMETER_NAMES
+from ses_core.learning.policies import ParameterPolicy, observer_for
 from ses_core.robot_profile import RobotProfile
 
 _OPSET = 18
@@ -30,10 +30,10 @@ _IR_VERSION = 8
 """Versions that ONNX Runtime 1.14 (ROS 2 Humble's time) and later read."""
 
 
-def export_onnx(policy: ParameterPolicy, observer: Observer, profile: RobotProfile) -> bytes:
+def export_onnx(policy: ParameterPolicy, profile: RobotProfile) -> bytes:
     """Write a policy for one robot's laser as an ONNX model; equal policies give equal bytes."""
     graph = _Graph()
-    parts = _scan_part(graph, observer)
+    parts = _scan_part(graph, observer_for(policy, profile))
     spec = policy.observation
     inputs = [_value("scan", profile.laser.beams), _value("goal_angle", 1)]
     parts.append(graph.apply("Mul", "goal_angle", graph.scalar("per_turn", 1 / (2 * np.pi))))
@@ -43,16 +43,16 @@ def export_onnx(policy: ParameterPolicy, observer: Observer, profile: RobotProfi
         share = graph.apply("Div", near, "goal_clip")
         parts.append(graph.apply("Sub", share, graph.scalar("half", 0.5)))
     if spec.has_parameters:
-        inputs.append(_value("parameters", len(PARAMETER_NAMES)))
-        parts.append(_encoded_parameters(graph))
+        inputs.append(_value("parameters", policy.action.length))
+        parts.append(_encoded_parameters(graph, policy.action))
     observation = graph.apply("Concat", *parts, axis=1)
-    _decoded_action(graph, _perceptron(graph, policy, observation))
+    _decoded_action(graph, _perceptron(graph, policy, observation), policy.action)
     model = helper.make_model(
         helper.make_graph(
             graph.nodes,
             "parameter_policy",
             inputs,
-            [_value("next_parameters", len(PARAMETER_NAMES))],
+            [_value("next_parameters", policy.action.length)],
             initializer=graph.constants,
         ),
         opset_imports=[helper.make_opsetid("", _OPSET)],
@@ -104,13 +104,17 @@ def _scan_part(graph: _Graph, observer: Observer) -> list[str]:
     return [graph.apply("Div", centred, clip)]
 
 
-def _encoded_parameters(graph: _Graph) -> str:
-    """Scale the parameters in force as `encode_parameters` does."""
-    middle = (PARAMETER_LOW + PARAMETER_HIGH) / 2.0
-    half = (PARAMETER_HIGH - PARAMETER_LOW) / 2.0
-    graph.constant("parameter_middle", middle.astype(np.float32))
-    graph.constant("parameter_half", half.astype(np.float32))
-    centred = graph.apply("Sub", "parameters", "parameter_middle")
+def _encoded_parameters(graph: _Graph, action: ActionSpec) -> str:
+    """Scale the parameters in force as `ActionSpec.encode` does."""
+    low, high = action.bounds()
+    values = "parameters"
+    if action.is_log.any():
+        graph.constant("has_log_scale", action.is_log)
+        positive = graph.apply("Max", values, graph.scalar("least_positive", 1e-12))
+        values = graph.apply("Where", "has_log_scale", graph.apply("Log", positive), values)
+    graph.constant("parameter_middle", ((low + high) / 2.0).astype(np.float32))
+    graph.constant("parameter_half", ((high - low) / 2.0).astype(np.float32))
+    centred = graph.apply("Sub", values, "parameter_middle")
     scaled = graph.apply("Div", centred, "parameter_half")
     return graph.apply("Clip", scaled, graph.scalar("least", -1.0), graph.scalar("most", 1.0))
 
@@ -125,14 +129,19 @@ def _perceptron(graph: _Graph, policy: ParameterPolicy, signal: str) -> str:
     return signal
 
 
-def _decoded_action(graph: _Graph, action: str) -> None:
-    """Map the action to its bounds as `decode_action` does."""
-    half = (PARAMETER_HIGH - PARAMETER_LOW) / 2.0
-    middle = (PARAMETER_LOW + PARAMETER_HIGH) / 2.0
-    graph.constant("action_half", half.astype(np.float32))
-    graph.constant("action_middle", middle.astype(np.float32))
-    scaled = graph.apply("Mul", action, "action_half")
-    graph.apply("Add", scaled, "action_middle", output="next_parameters")
+def _decoded_action(graph: _Graph, signal: str, action: ActionSpec) -> None:
+    """Map the action to its bounds as `ActionSpec.decode` does."""
+    low, high = action.bounds()
+    graph.constant("action_half", ((high - low) / 2.0).astype(np.float32))
+    graph.constant("action_middle", ((high + low) / 2.0).astype(np.float32))
+    scaled = graph.apply("Mul", signal, "action_half")
+    if not action.is_log.any():
+        graph.apply("Add", scaled, "action_middle", output="next_parameters")
+        return
+    graph.constant("sets_log_scale", action.is_log)
+    values = graph.apply("Add", scaled, "action_middle")
+    powers = graph.apply("Exp", values)
+    graph.apply("Where", "sets_log_scale", powers, values, output="next_parameters")
 
 
 def _value(name: str, width: int) -> ValueInfoProto:

@@ -6,19 +6,14 @@ import numpy as np
 from numpy.random import Generator
 
 from ses_core.arrays import Float32Array, FloatArray
+from ses_core.learning.action import SEVEN, ActionSpec
 from ses_core.learning.observation import (
     DEFAULT_OBSERVATION,
     ObservationSpec,
     Observer,
     make_observer,
 )
-from ses_core.planning.parameters import (
-    DWA_FAST,
-    DWA_SLOW,
-    PARAMETER_NAMES,
-    PlannerParameters,
-    decode_action,
-)
+from ses_core.planning.parameters import DWA_FAST, DWA_SLOW, PlannerParameters
 from ses_core.protocols import Policy
 from ses_core.robot_profile import RobotProfile
 
@@ -38,7 +33,7 @@ class FixedParameters:
     parameters: PlannerParameters
 
     def act(self, observations: FloatArray) -> FloatArray:
-        """Give the same parameters (N, 7) to every robot."""
+        """Give the same parameters (N, 8) to every robot."""
         return np.tile(self.parameters.as_array(), (len(observations), 1))
 
 
@@ -52,11 +47,11 @@ FIXED_POLICIES = {
 class ParameterPolicy:
     """pi: a perceptron from an observation to planner parameters (APPLR, section IV-A).
 
-    Hidden layers are rectified, the output is a hyperbolic tangent: an action in [-1, 1]^7,
-    which `decode_action` maps to the bounds of the parameters.
+    Hidden layers are rectified, the output is a hyperbolic tangent: an action in [-1, 1]^A.
 
     Attributes:
         observation: Layout of what it sees.
+        action: What it sets.
         weights: One (out, in) float32 matrix per layer.
         biases: One (out,) float32 vector per layer.
         decision_period: Driving between two decisions that it was trained for [s].
@@ -65,6 +60,7 @@ class ParameterPolicy:
     observation: ObservationSpec
     weights: tuple[Float32Array, ...]
     biases: tuple[Float32Array, ...]
+    action: ActionSpec = SEVEN
     decision_period: float = DECISION_PERIOD_S
 
     def __post_init__(self) -> None:
@@ -72,7 +68,7 @@ class ParameterPolicy:
             raise ValueError(
                 f"policy decides every {self.decision_period} s, expected more than 0 s"
             )
-        width = self.observation.length
+        width = self.observation.length(self.action)
         for number, (matrix, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             if matrix.ndim != 2 or matrix.shape[1] != width or bias.shape != matrix.shape[:1]:
                 raise ValueError(
@@ -80,8 +76,8 @@ class ParameterPolicy:
                     f"expected (n, {width}) and (n,)"
                 )
             width = matrix.shape[0]
-        if width != len(PARAMETER_NAMES):
-            raise ValueError(f"policy has {width} outputs, expected {len(PARAMETER_NAMES)}")
+        if width != self.action.length:
+            raise ValueError(f"policy has {width} outputs, expected {self.action.length}")
 
     @property
     def hidden_sizes(self) -> tuple[int, ...]:
@@ -89,7 +85,7 @@ class ParameterPolicy:
         return tuple(len(bias) for bias in self.biases[:-1])
 
     def actions(self, observations: FloatArray) -> FloatArray:
-        """Map observations (N, D) to actions (N, 7) in [-1, 1]."""
+        """Map observations (N, D) to actions (N, A) in [-1, 1]."""
         signal = np.asarray(observations, dtype=np.float64)
         for matrix, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             signal = np.maximum(signal @ matrix.T.astype(np.float64) + bias, 0.0)
@@ -101,28 +97,33 @@ class ParameterPolicy:
         return output.round(7)
 
     def act(self, observations: FloatArray) -> FloatArray:
-        """Map observations (N, D) to planner parameters (N, 7)."""
-        return decode_action(self.actions(observations))
+        """Map observations (N, D) to planner parameters (N, 8)."""
+        return self.action.decode(self.actions(observations))
 
 
 def random_policy(
-    observation: ObservationSpec, hidden_sizes: tuple[int, ...], *, rng: Generator
+    observation: ObservationSpec,
+    hidden_sizes: tuple[int, ...],
+    *,
+    rng: Generator,
+    action: ActionSpec = SEVEN,
 ) -> ParameterPolicy:
     """Draw an untrained policy whose parameters stay near the middle of their bounds."""
-    widths = (observation.length, *hidden_sizes, len(PARAMETER_NAMES))
+    widths = (observation.length(action), *hidden_sizes, action.length)
     scales = [np.sqrt(2.0 / fan_in) for fan_in in widths[:-2]] + [0.01]
     weights = tuple(
         (scale * rng.standard_normal((after, before))).astype(np.float32)
         for scale, before, after in zip(scales, widths[:-1], widths[1:], strict=True)
     )
     biases = tuple(np.zeros(width, dtype=np.float32) for width in widths[1:])
-    return ParameterPolicy(observation=observation, weights=weights, biases=biases)
+    return ParameterPolicy(observation=observation, weights=weights, biases=biases, action=action)
 
 
 def observer_for(policy: Policy, profile: RobotProfile) -> Observer:
     """Give what a policy sees the world through on a robot; fixed parameters ignore it."""
-    spec = policy.observation if isinstance(policy, ParameterPolicy) else DEFAULT_OBSERVATION
-    return make_observer(spec, profile)
+    if isinstance(policy, ParameterPolicy):
+        return make_observer(policy.observation, profile, action=policy.action)
+    return make_observer(DEFAULT_OBSERVATION, profile, action=SEVEN)
 
 
 def decision_ticks(period: float, time_step: float) -> int:
@@ -137,8 +138,3 @@ def policy_ticks(policy: Policy, time_step: float) -> int:
     """
     period = policy.decision_period if isinstance(policy, ParameterPolicy) else DECISION_PERIOD_S
     return decision_ticks(period, time_step)
-
-
-def initial_parameters(count: int) -> FloatArray:
-    """Planner parameters (count, 7) in force before the first decision: the robot's defaults."""
-    return np.tile(DWA_SLOW.as_array(), (count, 1))

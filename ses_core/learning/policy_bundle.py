@@ -23,16 +23,17 @@ from safetensors.numpy import save as save_tensors
 
 from ses_core.arrays import Float32Array
 from ses_core.errors import ArtifactError
-from ses_core.learning.observation import ObservationSpec, make_observer
+from ses_core.learning.observation import ObservationSpec
 from ses_core.learning.policies import DECISION_PERIOD_S, ParameterPolicy
 from ses_core.learning.policy_record import (
     action_record,
     observation_record,
     policy_card,
+    read_action,
     reward_record,
 )
 from ses_core.learning.reward import RewardSpec
-from ses_core.recipes import JsonValue, canonical_json, digest_bytes, digest_json, settings_json
+from ses_core.recipes import JsonValue, digest_bytes, digest_json, settings_json
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
 from ses_core.settings_model import SettingsModel
@@ -100,7 +101,11 @@ def policy_id(policy: ParameterPolicy) -> str:
     their names.
     """
     weights = digest_bytes(save_tensors(_tensors(policy)))
-    named: list[JsonValue] = [weights, settings_json(policy.observation), action_record()]
+    named: list[JsonValue] = [
+        weights,
+        settings_json(policy.observation),
+        action_record(policy.action),
+    ]
     if policy.decision_period != DECISION_PERIOD_S:
         named.append(policy.decision_period)
     return digest_json(named)[:16]
@@ -127,14 +132,14 @@ def pack_bundle(
     from ses_core.learning.onnx_export import export_onnx
 
     weights = save_tensors(_tensors(policy))
-    model = export_onnx(policy, make_observer(policy.observation, profile), profile)
+    model = export_onnx(policy, profile)
     record = {
         "schema_version": SCHEMA_VERSION,
         "policy_id": policy_id(policy),
         "robot": profile.name,
         "decision_period_s": policy.decision_period,
-        "observation": observation_record(policy.observation),
-        "action": action_record(),
+        "observation": observation_record(policy.observation, policy.action),
+        "action": action_record(policy.action),
         "reward": reward_record(reward),
         "network": {
             "hidden_sizes": list(policy.hidden_sizes),
@@ -147,7 +152,7 @@ def pack_bundle(
             "onnx": digest_bytes(model),
             "simulation": digest_json(settings_json(simulation)),
             "robot_profile": digest_json(settings_json(profile)),
-            "action": digest_json(action_record()),
+            "action": digest_json(action_record(policy.action)),
         },
     }
     return {
@@ -179,10 +184,6 @@ def unpack_bundle(files: Mapping[str, bytes], *, source: str) -> PolicyBundle:
                 f"policy {source} has schema version {version}, expected at most {SCHEMA_VERSION}"
             )
         _check_digests(files, record["digests"], source=source)
-        if canonical_json(record["action"]) != canonical_json(action_record()):
-            raise ArtifactError(
-                f"policy {source} sets other parameters or bounds than this planner has"
-            )
         policy = _policy(record, load_tensors(files[WEIGHTS_FILE]))
         bundle = PolicyBundle(
             policy_id=policy_id(policy),
@@ -225,6 +226,7 @@ def _policy(record: Mapping[str, Any], tensors: Mapping[str, Float32Array]) -> P
         observation=_part(ObservationSpec, record["observation"]),
         weights=tuple(tensors[f"weight.{number}"] for number in layers),
         biases=tuple(tensors[f"bias.{number}"] for number in layers),
+        action=read_action(record["action"]),
         decision_period=record["decision_period_s"],
     )
 

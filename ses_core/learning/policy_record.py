@@ -5,18 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from ses_core.learning.action import ACTIONS, ActionParameter, ActionSpec
 from ses_core.learning.observation import ObservationSpec
 from ses_core.learning.reward import RewardSpec
-from ses_core.planning.parameters import (
-    PARAMETER_HIGH,
-    PARAMETER_LOW,
-    PARAMETER_NAMES,
-    PARAMETER_UNITS,
-)
+from ses_core.planning.parameters import PARAMETER_UNITS
 from ses_core.recipes import settings_json
 
 
-def observation_record(spec: ObservationSpec) -> dict[str, Any]:
+def observation_record(spec: ObservationSpec, action: ActionSpec) -> dict[str, Any]:
     """Give the layout with units, ranges and the formula of every part."""
     clip, goal = spec.laser_clip_m, spec.goal_clip_m
     parts: list[dict[str, Any]] = [
@@ -49,25 +45,51 @@ def observation_record(spec: ObservationSpec) -> dict[str, Any]:
         parts.append(
             {
                 "name": "parameters",
-                "length": len(PARAMETER_NAMES),
+                "length": action.length,
                 "unit": "own",
                 "range": "those of the action",
                 "normalisation": "2 (parameter - low) / (high - low) - 1",
             }
         )
-    return {**settings_json(spec), "length": spec.length, "parts": parts}
+    return {**settings_json(spec), "length": spec.length(action), "parts": parts}
 
 
-def action_record() -> dict[str, Any]:
+def action_record(action: ActionSpec) -> dict[str, Any]:
     """Give the parameters with units, bounds and the formula from an action."""
+    formula = "parameter = low + (action + 1) / 2 (high - low), action in [-1, 1]"
+    if action.is_log.any():
+        formula += "; on a log scale for the logarithms of parameter, low and high"
     return {
-        "normalisation": "parameter = low + (action + 1) / 2 (high - low), action in [-1, 1]",
-        "parameters": [
-            {"name": name, "unit": unit, "low": float(low), "high": float(high)}
-            for name, unit, low, high in zip(
-                PARAMETER_NAMES, PARAMETER_UNITS, PARAMETER_LOW, PARAMETER_HIGH, strict=True
-            )
-        ],
+        "normalisation": formula,
+        "parameters": [_parameter_record(parameter) for parameter in action.parameters],
+    }
+
+
+def read_action(record: Mapping[str, Any]) -> ActionSpec:
+    """Read back what `action_record` gave, under the name that the set has here, if any.
+
+    Raises:
+        ValueError: The planner has no such parameter, or its bounds are no bounds.
+    """
+    parameters = tuple(
+        ActionParameter(
+            name=row["name"], low=row["low"], high=row["high"], scale=row.get("scale", "linear")
+        )
+        for row in record["parameters"]
+    )
+    known = {spec.parameters: spec for spec in ACTIONS.values()}
+    return known.get(parameters) or ActionSpec(name="own", parameters=parameters)
+
+
+def _parameter_record(parameter: ActionParameter) -> dict[str, Any]:
+    # Linear scales are not named, so that policies from before there were others keep their ids.
+    scale = {} if parameter.scale == "linear" else {"scale": parameter.scale}
+    return {
+        "name": parameter.name,
+        "unit": PARAMETER_UNITS[parameter.name],
+        "low": parameter.low,
+        "high": parameter.high,
+        **scale,
     }
 
 

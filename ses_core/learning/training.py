@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 from ses_core.arrays import FloatArray
+from ses_core.learning.action import ACTIONS, DEFAULT_ACTION
 from ses_core.learning.algorithms import extract_policy, make_learner
 from ses_core.learning.decision_process import DecisionProcess
 from ses_core.learning.observation import observation_for
@@ -73,7 +74,7 @@ def train(
         deadline: Asked after every decision; the training ends when it says yes.
 
     Raises:
-        ValueError: There is no task.
+        ValueError: There is no task, or the parent sets other parameters than the settings ask for.
     """
     started = time.perf_counter()
     streams = np.random.SeedSequence(settings.seed).spawn(2)
@@ -81,7 +82,13 @@ def train(
         observation_for(settings.preset, profile),
         HIDDEN_SIZES[settings.preset],
         rng=np.random.default_rng(streams[0]),
+        action=ACTIONS[settings.action or DEFAULT_ACTION],
     )
+    if settings.action not in (None, start.action.name):
+        raise ValueError(
+            f"the policy to go on from sets {start.action.name} parameters, the settings ask for "
+            f"{settings.action}"
+        )
     start = replace(start, decision_period=settings.decision_period_s or start.decision_period)
     slots = min(settings.parallel_envs, max(1, settings.steps // _LEAST_ROUNDS))
     simulator = make_simulator(
@@ -95,6 +102,7 @@ def train(
             simulator,
             tasks=tasks,
             observation=start.observation,
+            action=start.action,
             profile=profile,
             settings=settings,
             decision_period=start.decision_period,

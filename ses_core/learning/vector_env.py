@@ -15,7 +15,6 @@ from ses_core.arrays import BoolArray, Float32Array
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.learning.decision_process import DecisionProcess
 from ses_core.learning.navigation_env import action_space, observation_space
-from ses_core.planning.parameters import PARAMETER_NAMES
 
 REWARD_SCALE = 0.1
 """What learners see is scaled: returns near 1 keep the critic's gradients at the actor's size."""
@@ -32,11 +31,13 @@ class VectorNavigationEnv(VecEnv):
 
     def __init__(self, process: DecisionProcess, *, rng: Generator) -> None:
         super().__init__(
-            process.simulator.slots, observation_space(process.observation), action_space()
+            process.simulator.slots,
+            observation_space(process.observation, process.action),
+            action_space(process.action),
         )
         self._process = process
         self._rng = rng
-        self._actions = np.zeros((self.num_envs, len(PARAMETER_NAMES)))
+        self._actions = np.zeros((self.num_envs, process.action.length))
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, dtype=np.int64)
 
@@ -48,7 +49,7 @@ class VectorNavigationEnv(VecEnv):
         return self._process.observe()
 
     def step_async(self, actions: Float32Array) -> None:
-        """Take the actions (N, 7) of the next step."""
+        """Take the actions (N, A) of the next step."""
         self._actions = np.asarray(actions, dtype=np.float64)
 
     def step_wait(self) -> tuple[Float32Array, Float32Array, BoolArray, list[dict[str, Any]]]:

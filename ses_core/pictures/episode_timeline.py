@@ -5,13 +5,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
 
 from ses_core.evaluation.episode_trace import EpisodeTrace, stretches
+from ses_core.learning.action import SEVEN
+from ses_core.learning.policies import ParameterPolicy
 from ses_core.pictures.figures import Theme, style_axes
-from ses_core.planning.parameters import (
-    PARAMETER_HIGH,
-    PARAMETER_LOW,
-    PARAMETER_NAMES,
-    PARAMETER_UNITS,
-)
+from ses_core.planning.parameters import PARAMETER_UNITS
 
 _STRIP = 0.72  # height of a parameter's strip; strips are 1 apart
 
@@ -57,9 +54,10 @@ def _draw_parameters(axes: Axes, trace: EpisodeTrace, *, moment: float, theme: T
     """Draw each planner parameter as a strip between its bounds, with its value at the moment."""
     axes.grid(visible=False, axis="y")
     now = int(np.searchsorted(trace.times, moment + 1e-6, side="right")) - 1
-    last = len(PARAMETER_NAMES) - 1
-    share = (trace.parameters - PARAMETER_LOW) / (PARAMETER_HIGH - PARAMETER_LOW)
-    for number, values in enumerate(np.clip(share, 0.0, 1.0).T):
+    policy = trace.drive.policy
+    action = policy.action if isinstance(policy, ParameterPolicy) else SEVEN
+    last = action.length - 1
+    for number, values in enumerate((action.encode(trace.parameters).T + 1.0) / 2.0):
         base = last - number
         color = theme.series[number % len(theme.series)]
         axes.axhspan(base, base + _STRIP, color=theme.faint, alpha=0.35, linewidth=0)
@@ -74,7 +72,7 @@ def _draw_parameters(axes: Axes, trace: EpisodeTrace, *, moment: float, theme: T
         )
         axes.step(trace.times, base + _STRIP * values, where="post", color=color, linewidth=1.4)
         axes.annotate(
-            _value(float(trace.parameters[now, number])),
+            _value(float(trace.parameters[now, action.places[number]])),
             (1.0, base + _STRIP / 2),
             xycoords=("axes fraction", "data"),
             xytext=(5, 0),
@@ -84,10 +82,8 @@ def _draw_parameters(axes: Axes, trace: EpisodeTrace, *, moment: float, theme: T
             color=theme.ink,
         )
     names = [
-        f"{name}  {low:g} to {high:g} {unit}"
-        for name, unit, low, high in zip(
-            PARAMETER_NAMES, PARAMETER_UNITS, PARAMETER_LOW, PARAMETER_HIGH, strict=True
-        )
+        f"{one.name}  {one.low:g} to {one.high:g} {PARAMETER_UNITS[one.name]}"
+        for one in action.parameters
     ]
     axes.set_yticks([last - number + _STRIP / 2 for number in range(last + 1)], names, fontsize=8)
     axes.tick_params(axis="y", length=0)

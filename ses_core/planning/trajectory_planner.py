@@ -28,6 +28,7 @@ MAX_VX_SAMPLES = 24
 MAX_VTHETA_SAMPLES = 64
 
 _MAX_VEL_X, _MAX_VEL_THETA, _VX_SAMPLES, _VTHETA_SAMPLES, _PATH_BIAS, _GOAL_BIAS = range(6)
+_OCCDIST_SCALE = 7
 
 
 @compiled_in_place
@@ -54,7 +55,7 @@ def find_command(
 ) -> bool:
     """Set the slot's command to the best sample's velocities.
 
-    The parameters (7,) are in the order of `PARAMETER_NAMES`, the period in s.
+    The parameters (8,) are in the order of `PARAMETER_NAMES`, the period in s.
 
     Returns:
         Whether there is a valid command; without one the robot stops.
@@ -118,6 +119,13 @@ def _forward_turn(place: int, w_low: float, w_step: float) -> float:
 
 
 @compiled_in_place
+def _obstacle_weight(robot: RobotModel, parameters: FloatArray) -> float:
+    """Give the weight of obstacle costs: the parameter, or below 0 the robot's own."""
+    weight = parameters[_OCCDIST_SCALE]
+    return weight if weight >= 0.0 else robot.occdist_scale
+
+
+@compiled_in_place
 def _best_forward(
     slot: Slot,
     memory: Memory,
@@ -135,6 +143,7 @@ def _best_forward(
     """Find the cheapest legal forward sample, the first of equals; (-1, -1) if none is legal."""
     x, y = window_place(slot, slot.x, slot.y)
     path, goal = memory.path_steps[number], memory.goal_steps[number]
+    weight = _obstacle_weight(robot, parameters)
     v_step = (v_high - v_low) / (vx_count - 1)
     count = vx_count * vtheta_count
     for place in range(vtheta_count):
@@ -157,11 +166,11 @@ def _best_forward(
         samples[sample] = math.inf
         v = v_low + (sample // vtheta_count) * v_step
         w = _forward_turn(sample % vtheta_count, w_low, w_step)
-        allowed = math.inf if best < 0 else (best_cost - end_cost) / robot.occdist_scale
+        allowed = math.inf if best < 0 else (best_cost - end_cost) / weight
         cost = rollout_cost(slot, memory, number, robot, v, w, True, allowed)
         if cost < 0.0:
             continue
-        cost = end_cost + robot.occdist_scale * cost
+        cost = end_cost + weight * cost
         if best < 0 or cost < best_cost or (cost == best_cost and sample < best):
             best, best_cost = sample, cost
 
@@ -200,6 +209,7 @@ def _prefer_turning(
     end_cost = _end_cost(path, goal, x, y, parameters)
     if end_cost == math.inf:
         return best_cost, best_v, best_w
+    weight = _obstacle_weight(robot, parameters)
     least_ahead = math.inf
     for k in range(vtheta_count):
         sampled = w_low + k * w_step
@@ -219,7 +229,7 @@ def _prefer_turning(
         cost = rollout_cost(slot, memory, number, robot, 0.0, w, True, math.inf)
         if cost < 0.0:
             continue
-        cost = end_cost + robot.occdist_scale * cost
+        cost = end_cost + weight * cost
         if best_cost < 0.0 or cost <= best_cost:
             best_cost, best_v, best_w, least_ahead = cost, 0.0, w, ahead
     return best_cost, best_v, best_w

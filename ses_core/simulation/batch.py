@@ -119,7 +119,7 @@ class BatchSimulator:
         self._run(SENSE, self._outside._replace(chosen=chosen))
 
     def advance(self, parameters: FloatArray, ticks: int) -> None:
-        """Run control ticks under planner parameters (N, 7)."""
+        """Run control ticks under planner parameters (N, 8)."""
         self._run(ADVANCE, self._outside, parameters=self._checked(parameters), ticks=ticks)
 
     def trace_into(self, trace: Trace) -> None:

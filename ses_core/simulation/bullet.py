@@ -85,7 +85,7 @@ class BulletSimulator:
             body.build(self._mesh(task.world.grid), Pose2D(*starts[number].tolist()))
 
     def advance(self, parameters: FloatArray, ticks: int) -> None:
-        """Run control ticks under planner parameters (N, 7)."""
+        """Run control ticks under planner parameters (N, 8)."""
         poses, velocities = np.zeros((self.slots, 3)), np.zeros((self.slots, 2))
         contacts = np.zeros(self.slots, dtype=np.bool_)
         for _ in range(ticks):

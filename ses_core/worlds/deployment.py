@@ -14,8 +14,9 @@ from ses_core.arrays import Float32Array, FloatArray, IntArray
 from ses_core.evaluation.outcomes import EpisodeOutcome
 from ses_core.geometry import wrap_angles
 from ses_core.imperfections import resolve
-from ses_core.learning.policies import initial_parameters, observer_for, policy_ticks
+from ses_core.learning.policies import observer_for, policy_ticks
 from ses_core.navigation import NavigationTask
+from ses_core.planning.parameters import initial_parameters
 from ses_core.protocols import Policy, Simulator
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
@@ -90,7 +91,7 @@ def _drive_all(
     observer = observer_for(policy, profile)
     ticks = policy_ticks(policy, simulator.time_step)
     recorder = _Recorder(simulator, simulation, beams=profile.laser.beams)
-    parameters = initial_parameters(simulator.slots)
+    parameters = initial_parameters(simulator.slots, profile)
     waiting = deque(range(len(tasks)))
     driven = np.full(simulator.slots, -1)
     idle = np.arange(simulator.slots)
@@ -103,7 +104,7 @@ def _drive_all(
             chosen = [tasks[number] for number in driven[slots]]
             seeds = [_task_seed(seed, number) for number in driven[slots].tolist()]
             simulator.reset(slots, chosen, np.array(seeds, dtype=np.int64))
-            parameters[slots] = initial_parameters(len(slots))
+            parameters[slots] = initial_parameters(len(slots), profile)
         observations = observer.observe(simulator.scans(), simulator.state(), parameters)
         parameters = policy.act(observations)
         simulator.advance(parameters, ticks)

@@ -187,7 +187,9 @@ def test_training_changed_weights_and_behaviour(fleet: Fleet, first: dict[str, A
     ours, original = read_policy(folder).policy, read_policy(ORIGINAL_FOLDER).policy
     assert isinstance(ours, ParameterPolicy)
     assert any((a != b).any() for a, b in zip(ours.weights, original.weights, strict=True))
-    observations = np.random.default_rng(0).uniform(-0.5, 0.5, (50, ours.observation.length))
+    observations = np.random.default_rng(0).uniform(
+        -0.5, 0.5, (50, ours.observation.length(ours.action))
+    )
     assert np.abs(ours.act(observations) - original.act(observations)).max() > 1e-6
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ses_core.errors import ArtifactError
+from ses_core.learning.action import SEVEN
 from ses_core.learning.observation import DEFAULT_OBSERVATION
 from ses_core.learning.policies import FIXED_POLICIES, ParameterPolicy, random_policy
 from ses_core.learning.policy_bundle import BUNDLE_FILES, Lineage, policy_id
@@ -133,5 +134,5 @@ def test_the_shipped_original_is_small_and_for_the_jackal() -> None:
     assert bundle.robot == JACKAL.name
     assert bundle.lineage.parent_id == ""
     # What it sets depends on what it sees: it is no constant in disguise.
-    seen = np.random.default_rng(0).uniform(-0.5, 0.5, (100, DEFAULT_OBSERVATION.length))
+    seen = np.random.default_rng(0).uniform(-0.5, 0.5, (100, DEFAULT_OBSERVATION.length(SEVEN)))
     assert np.ptp(bundle.policy.actions(seen), axis=0).max() > 0.2

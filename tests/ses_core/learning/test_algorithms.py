@@ -10,6 +10,7 @@ from stable_baselines3 import TD3
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from ses_core.arrays import Float32Array
+from ses_core.learning.action import SEVEN
 from ses_core.learning.algorithms import (
     actor_parameters,
     extract_policy,
@@ -27,18 +28,24 @@ ALGORITHMS: tuple[Algorithm, ...] = ("ppo", "td3", "sac")
 class Still(gymnasium.Env[Float32Array, Float32Array]):
     """Episodes of one decision, all alike."""
 
-    observation_space = observation_space(DEFAULT_OBSERVATION)
-    action_space = action_space()
+    observation_space = observation_space(DEFAULT_OBSERVATION, SEVEN)
+    action_space = action_space(SEVEN)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, object] | None = None
     ) -> tuple[Float32Array, dict[str, object]]:
-        return np.full(DEFAULT_OBSERVATION.length, 0.25, dtype=np.float32), {}
+        return np.full(DEFAULT_OBSERVATION.length(SEVEN), 0.25, dtype=np.float32), {}
 
     def step(
         self, action: Float32Array
     ) -> tuple[Float32Array, float, bool, bool, dict[str, object]]:
-        return np.full(DEFAULT_OBSERVATION.length, 0.25, dtype=np.float32), 1.0, True, False, {}
+        return (
+            np.full(DEFAULT_OBSERVATION.length(SEVEN), 0.25, dtype=np.float32),
+            1.0,
+            True,
+            False,
+            {},
+        )
 
 
 class Wanting(Still):
@@ -142,7 +149,7 @@ def test_a_learner_learns_what_is_rewarded(algorithm: Algorithm) -> None:
     env = DummyVecEnv([Wanting for _ in range(50)])
     learner, decisions = make_learner(env, start, settings=settings, is_fine_tuning=False)
     learner.learn(decisions)
-    seen = np.full((1, DEFAULT_OBSERVATION.length), 0.25)
+    seen = np.full((1, DEFAULT_OBSERVATION.length(SEVEN)), 0.25)
     assert abs(start.actions(seen)[0, 0]) < 0.2
     learned = extract_policy(learner, start).actions(seen)[0, 0]
     assert learned > 0.4

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ses_core.learning.action import SEVEN
 from ses_core.learning.observation import (
     AUTHORS_OBSERVATION,
     DEFAULT_OBSERVATION,
@@ -17,8 +18,7 @@ from ses_core.learning.observation import (
     make_observer,
     observation_for,
 )
-from ses_core.learning.policies import initial_parameters
-from ses_core.planning.parameters import PARAMETER_HIGH, PARAMETER_LOW
+from ses_core.planning.parameters import initial_parameters
 from ses_core.robot_profile import (
     JACKAL,
     NEATO,
@@ -42,9 +42,9 @@ def turned(laser_yaw: float) -> RobotProfile:
 
 
 def test_presets_have_the_lengths_they_are_documented_with() -> None:
-    assert AUTHORS_OBSERVATION.length == 721
-    assert DEFAULT_OBSERVATION.length == 129
-    assert PAPER_OBSERVATION.length == 728
+    assert AUTHORS_OBSERVATION.length(SEVEN) == 721
+    assert DEFAULT_OBSERVATION.length(SEVEN) == 129
+    assert PAPER_OBSERVATION.length(SEVEN) == 728
 
 
 @pytest.mark.parametrize(
@@ -65,40 +65,44 @@ def test_sectors_span_what_the_laser_sees(
     spec = observation_for(preset, profile)
     assert (spec.sector_min_rad, spec.sector_max_rad) == (right, left)
     assert spec.name == preset
-    assert spec.length == OBSERVATIONS[preset].length
+    assert spec.length(SEVEN) == OBSERVATIONS[preset].length(SEVEN)
     if profile is JACKAL:
         assert spec == OBSERVATIONS[preset]
     scan = np.full((1, profile.laser.beams), 0.5, dtype=np.float32)
-    assert (make_observer(spec, profile).pool(scan) == 0.5).all()
+    assert (make_observer(spec, profile, action=SEVEN).pool(scan) == 0.5).all()
 
 
 def test_a_laser_all_round_sees_what_is_behind_the_robot() -> None:
     behind = np.full((1, 720), 9.0, dtype=np.float32)
     behind[0, 0] = 0.7
-    pooled = make_observer(observation_for("default", TURTLEBOT4), TURTLEBOT4).pool(behind)[0]
+    pooled = make_observer(observation_for("default", TURTLEBOT4), TURTLEBOT4, action=SEVEN).pool(
+        behind
+    )[0]
     assert pooled.min() == np.float32(0.7)
-    assert (make_observer(DEFAULT_OBSERVATION, TURTLEBOT4).pool(behind) == 4.0).all()
+    assert (make_observer(DEFAULT_OBSERVATION, TURTLEBOT4, action=SEVEN).pool(behind) == 4.0).all()
 
 
 def test_authors_observation_is_that_of_ros_jackal() -> None:
     rng = np.random.default_rng(0)
     scans = rng.uniform(0.1, 5.0, (1, 720)).astype(np.float32)
     state = looking_at((3.0, 3.0), (0.6, 0.8))
-    seen = make_observer(AUTHORS_OBSERVATION, JACKAL).observe(scans, state, initial_parameters(1))
+    seen = make_observer(AUTHORS_OBSERVATION, JACKAL, action=SEVEN).observe(
+        scans, state, initial_parameters(1, JACKAL)
+    )
     expected = [*((np.clip(scans[0], 0, 2) - 1.0) / 2.0), math.atan2(0.8, 0.6) / (2 * math.pi)]
     np.testing.assert_allclose(seen[0], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("broken", [np.inf, np.nan, 0.0, -1.0, 0.05])
 def test_what_is_no_reading_counts_as_nothing_in_sight(broken: float) -> None:
-    observer = make_observer(DEFAULT_OBSERVATION, JACKAL)
+    observer = make_observer(DEFAULT_OBSERVATION, JACKAL, action=SEVEN)
     assert (observer.pool(np.full((1, 720), broken, dtype=np.float32)) == 4.0).all()
 
 
 def test_a_sector_reports_its_nearest_reading() -> None:
     scans = CLEAR.copy()
     scans[0, [6, 7, 11, 714]] = [3.0, 1.0, 2.0, 0.5]
-    pooled = make_observer(DEFAULT_OBSERVATION, JACKAL).pool(scans)[0]
+    pooled = make_observer(DEFAULT_OBSERVATION, JACKAL, action=SEVEN).pool(scans)[0]
     assert pooled[1] == 1.0
     assert pooled[119] == 0.5
     assert np.delete(pooled, [1, 119]).min() == 4.0
@@ -122,7 +126,7 @@ def test_pooling_agrees_with_looking_at_every_beam(profile: RobotProfile, seed: 
         filled.add(number)
         if reading >= laser.range_min_m:
             expected[number] = min(expected[number], float(reading))
-    pooled = make_observer(spec, profile).pool(scans)[0]
+    pooled = make_observer(spec, profile, action=SEVEN).pool(scans)[0]
     for number in filled:
         assert pooled[number] == pytest.approx(expected[number])
 
@@ -131,7 +135,9 @@ def test_sectors_beyond_a_narrow_laser_see_nothing() -> None:
     narrow = RobotProfile(
         laser=LaserProfile(beams=181, angle_min_rad=-math.pi / 2, angle_max_rad=math.pi / 2)
     )
-    pooled = make_observer(DEFAULT_OBSERVATION, narrow).pool(np.full((1, 181), 1.0, np.float32))[0]
+    pooled = make_observer(DEFAULT_OBSERVATION, narrow, action=SEVEN).pool(
+        np.full((1, 181), 1.0, np.float32)
+    )[0]
     assert (pooled[:19] == 4.0).all()
     assert (pooled[21:99] == 1.0).all()
     assert (pooled[101:] == 4.0).all()
@@ -139,7 +145,9 @@ def test_sectors_beyond_a_narrow_laser_see_nothing() -> None:
 
 def test_a_laser_coarser_than_the_sectors_leaves_no_gaps() -> None:
     coarse = RobotProfile(laser=LaserProfile(beams=60))
-    pooled = make_observer(DEFAULT_OBSERVATION, coarse).pool(np.full((1, 60), 1.0, np.float32))
+    pooled = make_observer(DEFAULT_OBSERVATION, coarse, action=SEVEN).pool(
+        np.full((1, 60), 1.0, np.float32)
+    )
     assert (pooled == 1.0).all()
 
 
@@ -148,19 +156,19 @@ def test_a_turned_laser_sees_the_same_place_alike() -> None:
     straight = np.full((1, 360), 4.0, dtype=np.float32)
     straight[0, 180] = 1.0
     backwards = np.roll(straight, 180, axis=1)
-    seen = make_observer(spec, turned(0.0)).pool(straight)
-    seen_turned = make_observer(spec, turned(math.pi)).pool(backwards)
+    seen = make_observer(spec, turned(0.0), action=SEVEN).pool(straight)
+    seen_turned = make_observer(spec, turned(math.pi), action=SEVEN).pool(backwards)
     assert seen.tolist() == seen_turned.tolist() == [[4.0, 1.0, 4.0]]
 
 
 def test_the_goal_and_the_parameters_follow_the_scan() -> None:
     state = looking_at((0.0, 4.0), (0.0, 1.0))
-    observer = make_observer(DEFAULT_OBSERVATION, JACKAL)
-    seen = observer.observe(CLEAR, state, PARAMETER_HIGH[None])[0]
+    observer = make_observer(DEFAULT_OBSERVATION, JACKAL, action=SEVEN)
+    seen = observer.observe(CLEAR, state, SEVEN.decode(np.ones((1, 7))))[0]
     assert seen[120] == pytest.approx(0.25)
     assert seen[121] == pytest.approx(-0.1)
     assert (seen[122:] == 1.0).all()
-    assert (observer.observe(CLEAR, state, PARAMETER_LOW[None])[0, 122:] == -1.0).all()
+    assert (observer.observe(CLEAR, state, SEVEN.decode(-np.ones((1, 7))))[0, 122:] == -1.0).all()
     assert goal_distances(state).tolist() == [4.0]
 
 
@@ -175,10 +183,12 @@ def test_observations_stay_in_their_bounds(
 ) -> None:
     scans = np.random.default_rng(seed).uniform(-1, 40, (1, 720)).astype(np.float32)
     state = looking_at((x, y), (x, y))
-    seen = make_observer(spec, JACKAL).observe(scans, state, initial_parameters(1))[0]
-    assert seen.shape == (spec.length,)
-    assert (seen >= spec.low()).all()
-    assert (seen <= spec.high()).all()
+    seen = make_observer(spec, JACKAL, action=SEVEN).observe(
+        scans, state, initial_parameters(1, JACKAL)
+    )[0]
+    assert seen.shape == (spec.length(SEVEN),)
+    assert (seen >= -spec.bounds(SEVEN)).all()
+    assert (seen <= spec.bounds(SEVEN)).all()
 
 
 def test_sectors_that_face_nowhere_are_refused() -> None:

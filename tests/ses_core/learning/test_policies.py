@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from ses_core.learning.action import SEVEN
 from ses_core.learning.observation import AUTHORS_OBSERVATION, DEFAULT_OBSERVATION
 from ses_core.learning.policies import (
     FIXED_POLICIES,
@@ -13,10 +14,7 @@ from ses_core.learning.policies import (
     random_policy,
 )
 from ses_core.planning.parameters import (
-    PARAMETER_HIGH,
-    PARAMETER_LOW,
     PlannerParameters,
-    decode_action,
 )
 from ses_core.robot_profile import JACKAL
 
@@ -32,20 +30,20 @@ def some_policy(seed: int = 0) -> ParameterPolicy:
 
 
 def some_observations(count: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    return np.random.default_rng(1).uniform(-0.5, 0.5, (count, DEFAULT_OBSERVATION.length))
+    return np.random.default_rng(1).uniform(-0.5, 0.5, (count, DEFAULT_OBSERVATION.length(SEVEN)))
 
 
 def test_fixed_parameters_never_change() -> None:
     policy = FixedParameters(PlannerParameters(max_vel_x=0.7))
     given = policy.act(np.zeros((3, 5)))
-    assert given.shape == (3, 7)
+    assert given.shape == (3, 8)
     assert (given[:, 0] == 0.7).all()
 
 
 def test_dwa_fast_is_twice_as_fast_as_dwa_slow() -> None:
     slow = FIXED_POLICIES["dwa-slow"].act(np.zeros((1, 1)))[0]
     fast = FIXED_POLICIES["dwa-fast"].act(np.zeros((1, 1)))[0]
-    assert (fast / slow).tolist() == [2.0, 1.0, 2.0, 1.0, 1.0, 1.0, 1.0]
+    assert (fast / slow).tolist() == [2.0, 1.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0]
 
 
 def test_the_perceptron_agrees_with_torch() -> None:
@@ -64,10 +62,11 @@ def test_parameters_span_their_bounds_and_never_leave_them() -> None:
     policy = some_policy()
     observations = some_observations(500)
     parameters = policy.act(observations)
-    assert (parameters >= PARAMETER_LOW).all()
-    assert (parameters <= PARAMETER_HIGH).all()
-    assert (np.ptp(parameters, axis=0) > 0.3 * (PARAMETER_HIGH - PARAMETER_LOW)).all()
-    np.testing.assert_array_equal(parameters, decode_action(policy.actions(observations)))
+    low, high = SEVEN.bounds()
+    assert (parameters[:, :7] >= low).all()
+    assert (parameters[:, :7] <= high).all()
+    assert (np.ptp(parameters[:, :7], axis=0) > 0.3 * (high - low)).all()
+    np.testing.assert_array_equal(parameters, SEVEN.decode(policy.actions(observations)))
 
 
 def test_a_robot_decides_the_same_alone_and_in_a_crowd() -> None:

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from ses_core.errors import ArtifactError
+from ses_core.learning.action import EIGHT, SEVEN, ActionSpec
+from ses_core.learning.action import SEVEN
 from ses_core.learning.observation import DEFAULT_OBSERVATION
 from ses_core.learning.policies import ParameterPolicy, random_policy
 from ses_core.learning.policy_bundle import (
@@ -50,7 +52,7 @@ def packed(seed: int = 0, policy: ParameterPolicy | None = None) -> dict[str, by
 
 def test_a_bundle_read_back_is_the_policy_that_was_packed() -> None:
     bundle = unpack_bundle(packed(), source="test")
-    seen = np.random.default_rng(1).uniform(-0.5, 0.5, (5, DEFAULT_OBSERVATION.length))
+    seen = np.random.default_rng(1).uniform(-0.5, 0.5, (5, DEFAULT_OBSERVATION.length(SEVEN)))
     np.testing.assert_array_equal(bundle.policy.act(seen), some_policy().act(seen))
     assert bundle.lineage == LINEAGE
     assert bundle.policy_id == policy_id(some_policy())
@@ -131,11 +133,26 @@ def test_a_newer_bundle_is_refused() -> None:
         unpack_bundle(changed_record(schema_version=3), source="test")
 
 
-def test_a_bundle_for_other_bounds_is_refused() -> None:
+@pytest.mark.parametrize("action", [SEVEN, EIGHT])
+def test_what_a_policy_sets_travels_with_it(action: ActionSpec) -> None:
+    policy = random_policy(DEFAULT_OBSERVATION, (8,), rng=np.random.default_rng(0), action=action)
+    bundle = unpack_bundle(packed(policy=policy), source="test")
+    assert bundle.policy.action == action
+    assert f"| `{action.names[-1]}` |" in packed(policy=policy)["card.md"].decode()
+
+
+def test_a_bundle_for_other_bounds_or_parameters_is_refused() -> None:
     action = json.loads(packed()[JSON_FILE])["action"]
     action["parameters"][0]["high"] = 3.0
-    with pytest.raises(ArtifactError, match="other parameters or bounds"):
+    with pytest.raises(ArtifactError, match="is named"):
         unpack_bundle(changed_record(action=action), source="test")
+    action["parameters"][0]["name"] = "max_vel_y"
+    with pytest.raises(ArtifactError, match="no parameter 'max_vel_y'"):
+        unpack_bundle(changed_record(action=action), source="test")
+
+
+def test_policies_from_before_actions_differed_keep_their_names() -> None:
+    assert policy_id(some_policy()) == "89e6d159e84c1c9a"
 
 
 def test_weights_under_another_observation_are_refused() -> None:

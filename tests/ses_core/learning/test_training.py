@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from ses_core.learning.action import SEVEN
 from ses_core.learning.observation import (
     AUTHORS_OBSERVATION,
     DEFAULT_OBSERVATION,
@@ -19,7 +20,7 @@ from ses_core.settings import SimulationSettings, TrainingSettings
 from tests.ses_core.learning.places import corridor
 
 SHORT = TrainingSettings(steps=128, parallel_envs=4)
-SEEN = np.random.default_rng(9).uniform(-0.5, 0.5, (40, DEFAULT_OBSERVATION.length))
+SEEN = np.random.default_rng(9).uniform(-0.5, 0.5, (40, DEFAULT_OBSERVATION.length(SEVEN)))
 
 
 def parent() -> ParameterPolicy:

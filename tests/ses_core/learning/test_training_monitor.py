@@ -6,6 +6,7 @@ import pytest
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from ses_core.arrays import Float32Array
+from ses_core.learning.action import SEVEN
 from ses_core.learning.algorithms import make_learner
 from ses_core.learning.navigation_env import action_space, observation_space
 from ses_core.learning.observation import DEFAULT_OBSERVATION
@@ -19,8 +20,8 @@ STEPS, ROBOTS = 8192, 32
 class Scripted(gymnasium.Env[Float32Array, Float32Array]):
     """Episodes of one decision; they succeed until decision `turn`, and from there get stuck."""
 
-    observation_space = observation_space(DEFAULT_OBSERVATION)
-    action_space = action_space()
+    observation_space = observation_space(DEFAULT_OBSERVATION, SEVEN)
+    action_space = action_space(SEVEN)
 
     def __init__(self, turn: int) -> None:
         self._turn, self._made = turn, 0
@@ -28,7 +29,7 @@ class Scripted(gymnasium.Env[Float32Array, Float32Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, object] | None = None
     ) -> tuple[Float32Array, dict[str, object]]:
-        return np.zeros(DEFAULT_OBSERVATION.length, dtype=np.float32), {}
+        return np.zeros(DEFAULT_OBSERVATION.length(SEVEN), dtype=np.float32), {}
 
     def step(
         self, action: Float32Array
@@ -36,7 +37,7 @@ class Scripted(gymnasium.Env[Float32Array, Float32Array]):
         self._made += 1
         outcome = "success" if self._made <= self._turn else "stuck"
         info: dict[str, object] = {"outcome": outcome, "episode": {"r": 1.0, "l": 1, "t": 9.0}}
-        return np.zeros(DEFAULT_OBSERVATION.length, dtype=np.float32), 0.0, True, False, info
+        return np.zeros(DEFAULT_OBSERVATION.length(SEVEN), dtype=np.float32), 0.0, True, False, info
 
 
 def watch(turn: int, *, stop_after: int | None = None) -> tuple[TrainingMonitor, list[float], int]:

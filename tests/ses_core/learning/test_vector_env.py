@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ses_core.arrays import FloatArray
+from ses_core.learning.action import SEVEN
 from ses_core.learning.decision_process import DecisionProcess
 from ses_core.learning.navigation_env import NavigationEnv
 from ses_core.learning.observation import DEFAULT_OBSERVATION
@@ -29,6 +30,7 @@ def make_env(
         ),
         tasks=tasks,
         observation=DEFAULT_OBSERVATION,
+        action=SEVEN,
         profile=JACKAL,
         settings=TrainingSettings(),
         weights=weights,
@@ -69,6 +71,7 @@ def test_a_slot_drives_and_is_rewarded_as_one_environment_is() -> None:
         one_slot(),
         tasks=[corridor()],
         observation=DEFAULT_OBSERVATION,
+        action=SEVEN,
         profile=JACKAL,
         settings=TrainingSettings(),
     )

@@ -1,34 +1,15 @@
-"""Planner parameters and the actions that stand for them."""
+"""Planner parameters and what DWA slow and fast set them to."""
 
 import numpy as np
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from ses_core.planning.parameters import (
     DWA_FAST,
     DWA_SLOW,
-    PARAMETER_HIGH,
-    PARAMETER_LOW,
     PARAMETER_NAMES,
-    decode_action,
-    encode_parameters,
+    PARAMETER_UNITS,
+    initial_parameters,
 )
-
-actions = st.lists(st.floats(-1, 1), min_size=7, max_size=7).map(np.array)
-
-
-@given(actions)
-def test_decoding_then_encoding_gives_the_action_back(action: np.ndarray) -> None:
-    parameters = decode_action(action)
-    assert (parameters >= PARAMETER_LOW).all()
-    assert (parameters <= PARAMETER_HIGH).all()
-    assert encode_parameters(parameters) == pytest.approx(action, abs=1e-9)
-
-
-def test_an_action_out_of_bounds_is_clipped() -> None:
-    assert (decode_action(np.full(7, 5.0)) == PARAMETER_HIGH).all()
-    assert (decode_action(np.full(7, -5.0)) == PARAMETER_LOW).all()
+from ses_core.robot_profile import JACKAL, LocalPlannerProfile
 
 
 def test_fast_differs_from_slow_by_twice_the_speed_and_the_sampling_alone() -> None:
@@ -37,3 +18,14 @@ def test_fast_differs_from_slow_by_twice_the_speed_and_the_sampling_alone() -> N
     assert changed == {"max_vel_x", "vx_samples"}
     assert fast[0] == 2 * slow[0]
     assert fast[2] == 2 * slow[2]
+
+
+def test_a_robot_begins_with_its_own_weight_of_obstacles() -> None:
+    careful = JACKAL.model_copy(update={"planner": LocalPlannerProfile(occdist_scale=0.7)})
+    start = initial_parameters(2, careful)
+    np.testing.assert_array_equal(start[:, :7], np.tile(DWA_SLOW.as_array()[:7], (2, 1)))
+    assert (start[:, PARAMETER_NAMES.index("occdist_scale")] == 0.7).all()
+
+
+def test_every_parameter_has_a_unit() -> None:
+    assert tuple(PARAMETER_UNITS) == PARAMETER_NAMES

@@ -244,6 +244,7 @@ def test_where_no_way_leads_from_there_is_no_valid_command() -> None:
         ("path_distance_bias", 0.1),
         ("goal_distance_bias", 0.1),
         ("inflation_radius", 0.6),
+        ("occdist_scale", 0.001),
     ],
 )
 def test_every_parameter_acts_at_run_time(name: str, value: float) -> None:
