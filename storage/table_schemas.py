@@ -122,6 +122,7 @@ _REQUIRED: Final[dict[str, dict[str, pa.DataType]]] = {
         "optimal_time_s": _REAL,
         "barn_score": _REAL,
         "negative_velocity_count": _WHOLE,
+        "not_forward_count": _WHOLE,
     },
     "policies": {
         "policy_id": _TEXT,

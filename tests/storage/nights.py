@@ -311,6 +311,7 @@ def episode(policy: str, world: int) -> Episode:
         optimal_time_s=4.0,
         barn_score=0.2,
         negative_velocity_count=3,
+        not_forward_count=5,
         simulator="batch",
         start_x_m=1.0,
         start_y_m=1.5,
