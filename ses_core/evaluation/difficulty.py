@@ -1,22 +1,24 @@
 """Verified difficulty: how hard places turn out when a policy drives through them again.
 
 A scenario's label counts steps of one drive in the log, and travels badly into the place that is
-rebuilt of it: the approach, what lies around the window and chance all have a part in it.
+rebuilt of it: the approach, the size of the cells and chance all have a part in it
+(`docs/difficulty.md`). Recorded places are therefore entered heading as the log did.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from ses_core.arrays import FloatArray
 from ses_core.evaluation.episodes import Episode
-from ses_core.evaluation.places import crossing_places
 from ses_core.evaluation.statistics import TIME_CAP_S, restricted_time
-from ses_core.evaluation.trials import evaluate
+from ses_core.evaluation.trials import EvaluationTask, evaluate, evaluation_task
 from ses_core.extraction.difficulty import CountKind
-from ses_core.navigation import NavigationDomain, NavigationEnvironment
+from ses_core.geometry import Pose2D, wrap_angles
+from ses_core.navigation import NavigationEnvironment, environment_task
 from ses_core.protocols import Policy
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings
@@ -53,6 +55,7 @@ def verify(
     policy: Policy,
     *,
     policy_id: str,
+    headings: Mapping[str, float],
     trials: int,
     seed: int,
     simulation: SimulationSettings,
@@ -67,6 +70,8 @@ def verify(
         environments: No two of one id.
         policy: Who drives.
         policy_id: Its name in the rows.
+        headings: How a drive starts in an environment, by its id [rad in the frame of the
+            scenario]; where nothing is said, heading for the goal.
         trials: Drives through each, under different noise.
         seed: Of all noise.
         simulation: Rates and imperfections of the robot.
@@ -78,7 +83,7 @@ def verify(
     """
     episodes = evaluate(
         {policy_id: policy},
-        crossing_places(NavigationDomain(tuple(environments)), profile),
+        [_place(one, headings.get(one.environment_id, 0.0), profile) for one in environments],
         trials=trials,
         seed=seed,
         simulation=simulation,
@@ -86,6 +91,20 @@ def verify(
         progress=progress,
     )
     return difficulties(episodes)
+
+
+def _place(
+    environment: NavigationEnvironment, heading: float, profile: RobotProfile
+) -> EvaluationTask:
+    task = environment_task(environment)
+    start = Pose2D(task.start.x, task.start.y, heading)
+    return evaluation_task(replace(task, start=start), pair=0, profile=profile)
+
+
+def approach_heading(start: Pose2D, goal: tuple[float, float]) -> float:
+    """Give the heading [rad] of a start against the way straight to the goal, in (-pi, pi]."""
+    straight = math.atan2(goal[1] - start.y, goal[0] - start.x)
+    return float(wrap_angles(np.array(start.yaw - straight)))
 
 
 def difficulties(episodes: Sequence[Episode]) -> list[VerifiedDifficulty]:

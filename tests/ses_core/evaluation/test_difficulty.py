@@ -1,6 +1,7 @@
 """Tests of verified difficulty: places driven again, and what a training makes of it."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +12,13 @@ from hypothesis import strategies as st
 from ses_core.arrays import BoolArray
 from ses_core.evaluation.difficulty import (
     VerifiedDifficulty,
+    approach_heading,
     difficulties,
     draw_weights,
     simulated_count,
     verify,
 )
+from ses_core.geometry import Pose2D
 from ses_core.learning.policies import FIXED_POLICIES
 from ses_core.navigation import NavigationEnvironment
 from ses_core.robot_profile import JACKAL
@@ -53,11 +56,14 @@ def found(
     )
 
 
-def run(environments: Sequence[NavigationEnvironment]) -> list[VerifiedDifficulty]:
+def run(
+    environments: Sequence[NavigationEnvironment], headings: Mapping[str, float] | None = None
+) -> list[VerifiedDifficulty]:
     return verify(
         environments,
         FIXED_POLICIES["dwa-slow"],
         policy_id="dwa-slow",
+        headings=headings or {},
         trials=2,
         seed=1,
         simulation=SIMULATION,
@@ -80,6 +86,22 @@ def test_an_empty_place_is_easy_and_a_walled_one_is_not() -> None:
 def test_what_is_found_of_a_place_depends_on_none_beside_it() -> None:
     alone = run([environment("blocked", wall())])
     assert run([environment("empty"), environment("blocked", wall())])[1:] == alone
+
+
+def test_a_place_is_entered_as_it_was_in_the_log() -> None:
+    ahead, back = run([environment("ahead"), environment("back")], {"back": math.pi})
+    assert back.success_rate == 1.0
+    assert back.restricted_mean_time_s > ahead.restricted_mean_time_s + 1.0
+    assert back.not_forward_count > ahead.not_forward_count
+
+
+def test_the_approach_is_measured_from_the_way_to_the_goal() -> None:
+    for turn in (0.0, 1.0, -3.0, math.pi):
+        start = Pose2D(3.0, -2.0, 2.5 + turn)
+        goal = (3.0 + 5.0 * math.cos(2.5), -2.0 + 5.0 * math.sin(2.5))
+        found = approach_heading(start, goal)
+        assert math.cos(found - turn) == pytest.approx(1.0)
+        assert -math.pi <= found <= math.pi
 
 
 def test_no_place_is_driven_in_for_nothing() -> None:
