@@ -7,8 +7,9 @@ import numpy as np
 from _driven_scenarios import DrivenScenario
 
 from ses_core.arrays import BoolArray, FloatArray
-from ses_core.extraction.reconstruction import FINE, FINE_RESOLUTION_M, scenario_frame
-from ses_core.geometry import Pose2D, from_frame, wrap_angles
+from ses_core.evaluation.difficulty import approach_heading
+from ses_core.extraction.reconstruction import FINE, FINE_RESOLUTION_M
+from ses_core.geometry import Pose2D, from_frame
 from ses_core.navigation import NavigationTask, World
 from ses_core.occupancy import (
     ENVIRONMENT_CELLS,
@@ -39,7 +40,7 @@ def rebuilt(
     cells = one.environment.cells
     if is_unknown_occupied:
         cells = cells | ~one.environment.observed
-    yaw = _logged_heading(one) if is_heading_kept else 0.0
+    yaw = _heading(one) if is_heading_kept else 0.0
     return _task(one, environment_course(cells, apron=apron), yaw)
 
 
@@ -55,7 +56,7 @@ def surrounded(
         blocks = grid.cells[inside, inside].reshape(ENVIRONMENT_CELLS, FINE, -1, FINE)
         window = blocks.any(axis=(1, 3))
     grid.cells[inside, inside] = np.repeat(np.repeat(window, FINE, axis=0), FINE, axis=1)
-    return _task(one, grid, _logged_heading(one) if is_heading_kept else 0.0)
+    return _task(one, grid, _heading(one) if is_heading_kept else 0.0)
 
 
 def true_place(one: DrivenScenario) -> NavigationTask:
@@ -65,7 +66,7 @@ def true_place(one: DrivenScenario) -> NavigationTask:
 
 
 FORMS: dict[str, Form] = {
-    "as it is": rebuilt,
+    "heading for the goal": rebuilt,
     "heading as logged": lambda one: rebuilt(one, is_heading_kept=True),
     "apron 0.5 m": lambda one: rebuilt(one, apron=0.5),
     "apron 2 m": lambda one: rebuilt(one, apron=2.0),
@@ -78,7 +79,7 @@ FORMS: dict[str, Form] = {
     ),
     "true place": true_place,
 }
-"""What is compared, the default first."""
+"""What is compared: the first is what the others are set against, the second what nights do."""
 
 
 def _task(one: DrivenScenario, grid: OccupancyGrid, yaw: float) -> NavigationTask:
@@ -86,10 +87,9 @@ def _task(one: DrivenScenario, grid: OccupancyGrid, yaw: float) -> NavigationTas
     return NavigationTask(world=world, start=Pose2D(0.0, 0.0, yaw), goal=(ENVIRONMENT_SIDE_M, 0.0))
 
 
-def _logged_heading(one: DrivenScenario) -> float:
+def _heading(one: DrivenScenario) -> float:
     """Give the heading [rad] at the first step, in the frame of the scenario."""
-    turned = one.scenario.start.yaw - scenario_frame(one.scenario).yaw
-    return float(wrap_angles(np.array([turned]))[0])
+    return approach_heading(one.scenario.start, one.scenario.goal)
 
 
 def _true_surroundings(one: DrivenScenario) -> OccupancyGrid:
