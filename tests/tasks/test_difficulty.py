@@ -1,5 +1,6 @@
 """A night's verified difficulties: driven once, and only what is new where something is."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,11 @@ import pandas as pd
 import pytest
 from prefect.client.schemas.objects import State
 
+from ses_core.arrays import FloatArray
 from ses_core.difficulty_settings import DifficultySettings
 from ses_core.evaluation.difficulty import VerifiedDifficulty
-from ses_core.navigation import NavigationDomain, NavigationEnvironment
+from ses_core.learning import training
+from ses_core.navigation import NavigationDomain, NavigationEnvironment, NavigationTask
 from ses_core.recipes import ArtifactRef
 from ses_core.robot_profile import JACKAL
 from ses_core.settings import Settings, SimulationSettings, TrainingSettings
@@ -125,6 +128,48 @@ def test_what_an_earlier_night_drove_is_not_driven_again(
     assert driven == [row.environment_id for row in together if row.environment_id not in rows]
     assert len(driven) == 1
     assert [row for row in together if row.environment_id in rows] == list(rows.values())
+
+
+def test_recorded_places_are_entered_as_they_were_in_the_log(
+    store: LocalArtifactStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pool = select(store, np.zeros((1, 30, 30), dtype=np.bool_), ["a"])
+    made = synthesize(store, drawn(1))
+    ahead = read_difficulties(store.path(check(store, pool, made).ref))
+    monkeypatch.setattr(difficulty, "logged_headings", lambda _, places: {"e0": math.pi})
+    back = read_difficulties(store.path(check(store, pool, made).ref))
+    assert back[0].environment_id == "e0"
+    assert back[0].restricted_mean_time_s > ahead[0].restricted_mean_time_s + 1.0
+    assert back[1] == ahead[1]
+
+
+def test_what_is_hard_is_drawn_more_often(
+    store: LocalArtifactStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn_by: list[FloatArray | None] = []
+    train = training.train
+
+    def spy(tasks: Sequence[NavigationTask], **named: Any) -> training.TrainingResult:
+        drawn_by.append(named["weights"])
+        return train(tasks, **named)
+
+    monkeypatch.setattr(training, "train", spy)
+    made = synthesize(store, drawn(3))
+    short = TrainingSettings(steps=32, parallel_envs=2, difficulty="weigh")
+    settings = SETTINGS.model_copy(update={"training": short})
+    found = check(store, select(store, pillars(2, seed=0), ["a"] * 2), made, settings)
+    train_policy.fn(
+        made,
+        difficulty=found.ref,
+        parent="original",
+        run_id="night",
+        store=store,
+        settings=settings,
+    )
+    times = [row.restricted_mean_time_s for row in read_difficulties(store.path(found.ref))]
+    (weights,) = drawn_by
+    assert weights is not None
+    np.testing.assert_allclose(weights, 0.2 + np.array(times[2:]) / 100.0)
 
 
 def test_training_by_difficulty_draws_only_what_is_left(
