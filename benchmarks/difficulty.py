@@ -65,8 +65,9 @@ def measure(
             reference = None if name == default else scores[default]
             rows.append(_row(name, label, success, logged, scores[name], draws, reference))
         success = float(np.mean([one.success_rate for one in again]))
-        first, second = scores["true place"], _scores(again, column)
-        rows.append(_row("true place, twice", label, success, first, second, draws))
+        labelled_by = _COUNTS["negative"] if label == _BY_TIME else column
+        first = _scores(simulated["true place"], labelled_by)
+        rows.append(_row("true place, twice", label, success, first, _scores(again, column), draws))
     return rows
 
 
