@@ -127,6 +127,7 @@ _REFS = (
     "selection",
     "environments",
     "scorecard",
+    "difficulty",
     "worlds",
     "policy",
     "evaluation",

@@ -230,11 +230,18 @@ def synthesize_environments(
 
 
 def train(
-    night: Night, environments: ArtifactRef, *, parent: str, run_id: str, deadline: float | None
+    night: Night,
+    environments: ArtifactRef,
+    *,
+    difficulty: ArtifactRef | None,
+    parent: str,
+    run_id: str,
+    deadline: float | None,
 ) -> ArtifactRef:
     """Fine-tune from the parent; give the policy's bundle."""
     made = train_policy.submit(
         environments,
+        difficulty=difficulty,
         parent=parent,
         run_id=run_id,
         store=night.store,

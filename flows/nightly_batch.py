@@ -11,6 +11,7 @@ from prefect.task_runners import TaskRunner, ThreadPoolTaskRunner
 
 from flows.night_announcement import announce_night
 from flows.night_conclusion import conclude_night, made_nothing, measure
+from flows.night_difficulty import verify_night
 from flows.night_scorecard import score_night
 from flows.night_stages import (
     Night,
@@ -97,7 +98,15 @@ def learn(
     if not night.summary.environments:
         return made_nothing(night, run_id, day=day, parent=parent, selection=selection_ref)
     scorecard = score_night(night, selection_ref, environments)
-    policy = train(night, environments, parent=parent, run_id=run_id, deadline=deadline)
+    difficulty = verify_night(night, selection_ref, environments, parent=parent)
+    policy = train(
+        night,
+        environments,
+        difficulty=difficulty,
+        parent=parent,
+        run_id=run_id,
+        deadline=deadline,
+    )
     policies = {
         run_id: str(night.store.path(policy)),
         parent: parent,
@@ -114,6 +123,7 @@ def learn(
         selection=selection_ref,
         environments=environments,
         scorecard=scorecard,
+        difficulty=difficulty,
         worlds=worlds,
         policy=policy,
         evaluation=evaluation,

@@ -177,6 +177,11 @@ class SimulatorState(Protocol):
         ...
 
     @property
+    def not_forward_counts(self) -> IntArray:
+        """Control ticks with a commanded v <= 0.05 m/s (N,)."""
+        ...
+
+    @property
     def outcomes(self) -> IntArray:
         """`EpisodeOutcome` values (N,); RUNNING while unfinished."""
         ...

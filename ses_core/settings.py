@@ -1,9 +1,10 @@
 """Every setting of a night, one frozen model per stage; defaults are the paper's numbers."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from ses_core.difficulty_settings import DifficultySettings
 from ses_core.fleet_settings import FleetSettings
 from ses_core.imperfections import Imperfections, PresetName
 from ses_core.robot_profile import JACKAL, KNOWN_PROFILES, RobotProfile
@@ -192,6 +193,11 @@ class TrainingSettings(SettingsModel):
         0.1, ge=0, description="A start is shifted by up to this, either way."
     )
     simulator: Literal["batch", "bullet"] = Field("batch", description="Where it is trained.")
+    difficulty: Literal["ignore", "weigh", "filter"] = Field(
+        "ignore",
+        description="'weigh' draws an environment the more often the longer the policy gone on "
+        "from takes in it, 'filter' never one that it always crosses without backing up.",
+    )
 
 
 class EvaluationSettings(SettingsModel):
@@ -232,6 +238,7 @@ class Settings(SettingsModel):
     evaluation: EvaluationSettings = EvaluationSettings()
     fleet: FleetSettings = FleetSettings()
     scorecard: ScorecardSettings = ScorecardSettings()
+    difficulty: DifficultySettings = DifficultySettings()
     store: StoreSettings = StoreSettings()
     target_robot: RobotProfile = Field(
         JACKAL, description="The robot that is trained: a profile, or the name of one."
@@ -248,3 +255,13 @@ class Settings(SettingsModel):
         if value not in profiles:
             raise ValueError(f"no robot profile has that name, expected {', '.join(profiles)}")
         return profiles[value]
+
+    @model_validator(mode="after")
+    def _difficulty_is_known(self) -> Self:
+        """Refuse to train by a difficulty that nobody verifies."""
+        if self.training.difficulty != "ignore" and not self.difficulty.trials:
+            raise ValueError(
+                f"training.difficulty is {self.training.difficulty!r} and difficulty.trials is 0, "
+                "expected at least 1 trial"
+            )
+        return self

@@ -19,6 +19,7 @@ class NightArtifacts:
         log_ids: Logs of the night's batch.
         refused: Name, reason and message of the logs that were refused.
         scorecard: How well the synthesized environments stand for the pool.
+        difficulty: How hard the parent finds the pool's places and the synthesized ones.
         spot_check: Episodes of the same policies in PyBullet.
         stages: Built, found and seconds by stage, up to here.
         is_demonstration: Whether the page has to say so.
@@ -37,6 +38,7 @@ class NightArtifacts:
     selection: ArtifactRef | None
     environments: ArtifactRef | None
     scorecard: ArtifactRef | None
+    difficulty: ArtifactRef | None
     worlds: ArtifactRef | None
     policy: ArtifactRef | None
     evaluation: ArtifactRef | None
@@ -50,6 +52,7 @@ class NightArtifacts:
             "filter": self.selection,
             "synthesize": self.environments,
             "scorecard": self.scorecard,
+            "difficulty": self.difficulty,
             "render": self.worlds,
             "train": self.policy,
             "evaluate": self.evaluation,

@@ -18,6 +18,7 @@ from ses_core.extraction.holdout import Holdout
 from ses_core.extraction.selection import COUNT_COLUMNS
 from ses_core.navigation import NavigationDomain, NavigationEnvironment
 from storage.artifact_store import LocalArtifactStore
+from storage.difficulty_contents import gather_difficulty
 from storage.environment_files import SYNTHESIS_FILE, read_environments
 from storage.evaluation_files import read_episodes
 from storage.night_artifacts import NightArtifacts
@@ -90,6 +91,7 @@ def gather_night(night: NightArtifacts, *, store: LocalArtifactStore) -> NightRe
             for one in synthesized.environments
         ),
         scorecard=read_scored(store.path(night.scorecard)) if night.scorecard else None,
+        difficulty=gather_difficulty(night, selection, synthesized, store=store),
         training=training,
         evaluation=_evaluation(night, store=store),
         champion=None if night.parent == "original" else night.parent,

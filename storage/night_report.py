@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ses_core.arrays import BoolArray, FloatArray, IntArray
 from ses_core.evaluation.comparison import Comparison
 from ses_core.evaluation.episodes import Episode
+from ses_core.evaluation.label_agreement import LabelAgreement
 from ses_core.evaluation.statistics import PolicySummary
 from ses_core.extraction.funnel import FunnelStep
 from ses_core.learning.training_curve import CurvePoint
@@ -123,6 +124,35 @@ class SynthesisUse:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DifficultyUse:
+    """What became of the pool's labels when its places were driven through again.
+
+    Attributes:
+        driver: Who drove.
+        trials: Drives through each place.
+        count_name: The count, in words.
+        logged: (N,) by the log, of the recorded places.
+        simulated: (N,) of the same places driven again, means over the trials.
+        threshold: What the log calls challenging is above it.
+        whole: Agreement over all recorded places.
+        sites: Agreement site by site.
+        synthesized: Synthesized environments driven.
+        synthesized_hard: Share of these whose count is above the threshold; None without any.
+    """
+
+    driver: str
+    trials: int
+    count_name: str
+    logged: FloatArray
+    simulated: FloatArray
+    threshold: float
+    whole: LabelAgreement
+    sites: Mapping[str, LabelAgreement]
+    synthesized: int
+    synthesized_hard: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrainingUse:
     """What was trained, from which policy, and how training episodes went."""
 
@@ -179,6 +209,7 @@ class NightReport:
             own; the page shows the first ones.
         synthesized: Environments that were trained in.
         scorecard: How well these stand for the recorded ones that were learned from.
+        difficulty: How hard both turned out when they were driven through.
         pictures: Further pictures: logs over their paths, rendered worlds.
         lineage: What was made from what: names and digests, in order.
         demonstration_decisions: Decisions trained, when the night is a demonstration.
@@ -198,6 +229,7 @@ class NightReport:
     synthesis: SynthesisUse | None = None
     synthesized: tuple[ShownEnvironment, ...] = ()
     scorecard: Scorecard | None = None
+    difficulty: DifficultyUse | None = None
     training: TrainingUse | None = None
     evaluation: EvaluationUse | None = None
     champion: str | None = None

@@ -1,4 +1,4 @@
-"""What a night adds to the tables: its selection, its environments, its episodes, its policy."""
+"""What a night adds to the tables: selection, environments and their difficulty, trials, policy."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 from ses_core.evaluation.episodes import episode_columns
 from ses_core.evaluation.statistics import summarize
 from storage.artifact_store import LocalArtifactStore
+from storage.difficulty_files import read_conditions, read_difficulties, write_difficulties
 from storage.environment_files import read_environments, write_environments
 from storage.evaluation_files import EPISODES_FILE, read_episodes
 from storage.night_artifacts import NightArtifacts
@@ -31,6 +32,14 @@ def write_night_tables(
             directory,
             read_environments(store.path(night.environments)),
             target=night.settings.target_robot,
+            run_id=night.run_id,
+        )
+    if night.difficulty is not None:
+        folder = store.path(night.difficulty)
+        write_difficulties(
+            directory,
+            read_difficulties(folder),
+            conditions=read_conditions(folder),
             run_id=night.run_id,
         )
     if night.evaluation is not None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from ses_core.pictures.difficulty_figure import draw_difficulty
 from ses_core.pictures.evaluation_figure import draw_evaluation, draw_worlds
 from ses_core.pictures.figures import DARK, LIGHT, Theme
 from ses_core.pictures.funnel import funnel_figure
@@ -81,6 +82,17 @@ def _pictures(report: NightReport) -> dict[str, Markup]:
         drawings["scorecard"] = (
             "measures of real and synthesized environments",
             lambda theme: draw_scorecard(scorecard.rows, scorecard.measures, theme=theme),
+        )
+    if (difficulty := report.difficulty) and len(difficulty.logged):
+        drawings["difficulty"] = (
+            f"{difficulty.count_name}: by the log, and driven again",
+            lambda theme: draw_difficulty(
+                difficulty.logged,
+                difficulty.simulated,
+                threshold=difficulty.threshold,
+                count_name=difficulty.count_name,
+                theme=theme,
+            ),
         )
     if report.training and (curve := report.training.curve):
         drawings["curve"] = (

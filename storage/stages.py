@@ -13,9 +13,10 @@ FILTER = Stage("filter", 1)
 FIT = Stage("fit", 2)
 SYNTHESIZE = Stage("synthesize", 2)
 SCORECARD = Stage("scorecard", 1)
+DIFFICULTY = Stage("difficulty", 1)
 RENDER = Stage("render", 1)
 TRAIN = Stage("train", 2)
-EVALUATE = Stage("evaluate", 3)
+EVALUATE = Stage("evaluate", 4)
 REPORT = Stage("report", 3)
 PRETRAIN = Stage("pretrain", 2)
 DEPLOY = Stage("deploy", 2)
@@ -28,6 +29,7 @@ STAGES = (
     FIT,
     SYNTHESIZE,
     SCORECARD,
+    DIFFICULTY,
     RENDER,
     TRAIN,
     EVALUATE,
@@ -36,5 +38,5 @@ STAGES = (
     DEPLOY,
 )
 
-DISPOSABLE_STAGES = (BATCH, FIT, SCORECARD, RENDER, REPORT)
+DISPOSABLE_STAGES = (BATCH, FIT, SCORECARD, DIFFICULTY, RENDER, REPORT)
 """Stages whose artifacts only serve their own night: dropped when long unused."""

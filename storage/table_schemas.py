@@ -122,6 +122,19 @@ _REQUIRED: Final[dict[str, dict[str, pa.DataType]]] = {
         "optimal_time_s": _REAL,
         "barn_score": _REAL,
         "negative_velocity_count": _WHOLE,
+        "not_forward_count": _WHOLE,
+    },
+    "difficulties": {
+        "environment_id": _TEXT,
+        "policy_id": _TEXT,
+        "trials": _WHOLE,
+        # Means over the trials.
+        "negative_velocity_count": _REAL,
+        "not_forward_count": _REAL,
+        "success_rate": _REAL,
+        "restricted_mean_time_s": _REAL,
+        # Digest of all that decides a row beside its environment.
+        "conditions": _TEXT,
     },
     "policies": {
         "policy_id": _TEXT,
@@ -198,6 +211,8 @@ _NULLABLE: Final[dict[str, dict[str, pa.DataType]]] = {
         "goal_x_m": _REAL,
         "goal_y_m": _REAL,
     },
+    # The night that asked.
+    "difficulties": {"run_id": _TEXT},
     "policies": {"parent_id": _TEXT, "success_rate": _REAL, "mean_time_s": _REAL},
     "scorecard": {
         "value": _REAL,

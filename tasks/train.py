@@ -5,15 +5,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 from prefect import task
 from prefect.cache_policies import NO_CACHE
 
+from ses_core.arrays import FloatArray
+from ses_core.evaluation.difficulty import draw_weights
 from ses_core.learning.policy_bundle import Lineage
 from ses_core.learning.reward import reward_of
 from ses_core.navigation import NavigationTask, environment_task
 from ses_core.recipes import ArtifactRef, JsonValue, Recipe, settings_json
 from ses_core.settings import Settings
 from storage.artifact_store import LocalArtifactStore
+from storage.difficulty_files import read_difficulties
 from storage.environment_files import read_environments
 from storage.materialize import Materialized, materialize
 from storage.policy_files import NamedPolicy, find_policy, write_curve, write_policy
@@ -21,6 +25,7 @@ from storage.stage_records import write_record
 from storage.stages import TRAIN
 from storage.training_record import TRAINING_FILE, TrainingRecord
 from storage.world_sets import read_worlds
+from tasks.difficulty import drive_again
 from tasks.outcome import conclude
 from tasks.progress import report_progress
 
@@ -38,6 +43,7 @@ def train_policy(
     run_id: str,
     store: LocalArtifactStore,
     settings: Settings,
+    difficulty: ArtifactRef | None = None,
     deadline_stamp_s: float | None = None,
     anew: bool = False,
 ) -> Materialized:
@@ -49,6 +55,7 @@ def train_policy(
         run_id: The night that asks.
         store: Where the bundle goes.
         settings: Training, simulation and target robot.
+        difficulty: How hard the parent finds them; it counts only where training uses it.
         deadline_stamp_s: Unix time at which training stops where it is [s].
         anew: Train although it was done before.
     """
@@ -60,10 +67,15 @@ def train_policy(
         "parent": source.policy_id,
         "has_deadline": deadline_stamp_s is not None,
     }
+    use = settings.training.difficulty
+    inputs: tuple[ArtifactRef, ...] = (environments,)
+    if use != "ignore" and difficulty is not None:
+        inputs += (difficulty,)
 
     def build(directory: Path) -> None:
         domain = read_environments(store.path(environments))
         tasks = [environment_task(environment) for environment in domain.environments]
+        found = [row for ref in inputs[1:] for row in read_difficulties(store.path(ref))]
         made_by = sorted({environment.origin for environment in domain.environments})
         save_training(
             directory,
@@ -72,12 +84,11 @@ def train_policy(
             run_id=run_id,
             trained_in=f"environments of 5 m synthesized by {', '.join(made_by)}",
             settings=settings,
+            weights=draw_weights(domain.environments, found, use),
             deadline=stop_at(deadline_stamp_s),
         )
 
-    return conclude(
-        materialize(store, Recipe(TRAIN, asked, inputs=(environments,)), build, anew=anew)
-    )
+    return conclude(materialize(store, Recipe(TRAIN, asked, inputs=inputs), build, anew=anew))
 
 
 @task(name="train the policy in a folder", cache_policy=NO_CACHE)
@@ -86,13 +97,16 @@ def train_in_folder(
 ) -> TrainingRecord:
     """Go on from the parent in a folder of environments, and write the bundle into another."""
     domain = read_environments(environments)
+    source, use = find_policy(parent, store.layout), settings.training.difficulty
+    found = [] if use == "ignore" else drive_again(domain.environments, source, settings=settings)
     return save_training(
         out,
         [environment_task(environment) for environment in domain.environments],
-        parent=find_policy(parent, store.layout),
+        parent=source,
         run_id="",
         trained_in=f"{len(domain.environments)} environments of 5 m",
         settings=settings,
+        weights=draw_weights(domain.environments, found, use),
     )
 
 
@@ -141,6 +155,7 @@ def save_training(
     run_id: str,
     trained_in: str,
     settings: Settings,
+    weights: FloatArray | None = None,
     deadline: Callable[[], bool] = lambda: False,
 ) -> TrainingRecord:
     """Train and write bundle, learning curve and record into a folder.
@@ -152,6 +167,7 @@ def save_training(
         run_id: The run that asks, for the lineage.
         trained_in: What the tasks are, in words, for the card.
         settings: Training, simulation and target robot.
+        weights: How often each task is drawn; equally often without.
         deadline: Asked after every decision whether to stop.
     """
     # torch and stable-baselines3 take seconds to import: only a training pays for them.
@@ -164,6 +180,7 @@ def save_training(
         settings=settings.training,
         simulation=settings.simulation,
         profile=settings.target_robot,
+        weights=weights,
         progress=report_progress("train"),
         deadline=deadline,
     )
@@ -171,7 +188,7 @@ def save_training(
         algorithm=settings.training.algorithm,
         steps=result.steps,
         seed=settings.training.seed,
-        environments=len(tasks),
+        environments=len(tasks) if weights is None else int(np.count_nonzero(weights)),
         seconds=round(result.seconds, 1),
         ended=result.reason,
         parent=parent.name if parent else "",

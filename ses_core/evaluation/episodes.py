@@ -32,6 +32,7 @@ class Episode:
     optimal_time_s: float
     barn_score: float
     negative_velocity_count: int
+    not_forward_count: int
     simulator: str
     start_x_m: float
     start_y_m: float

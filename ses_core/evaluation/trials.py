@@ -227,6 +227,7 @@ def finished_episode(
         optimal_time_s=place.optimal_time_s,
         barn_score=barn_score(outcome, time=time, optimal_time=place.optimal_time_s),
         negative_velocity_count=int(state.negative_counts[slot]),
+        not_forward_count=int(state.not_forward_counts[slot]),
         simulator=simulator,
         start_x_m=place.task.start.x,
         start_y_m=place.task.start.y,

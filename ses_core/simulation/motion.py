@@ -14,6 +14,9 @@ _COLLISION = int(EpisodeOutcome.COLLISION)
 _TIMEOUT = int(EpisodeOutcome.TIMEOUT)
 _STUCK = int(EpisodeOutcome.STUCK)
 
+NOT_FORWARD_SPEED_MPS = 0.05
+"""At or below this command a tick counts as not moving forward: `ExtractionSettings`' default."""
+
 _MOTION_STEP_M = 0.02  # the body is tested for contact at least this often on its way
 
 
@@ -92,6 +95,8 @@ def settle(
     remember_pose(slot, memory, number)
     if slot.command_v < 0.0:
         slot.negative_count += 1
+    if slot.command_v <= NOT_FORWARD_SPEED_MPS:
+        slot.not_forward_count += 1
     if math.hypot(x - slot.anchor_x, y - slot.anchor_y) >= setup.stuck_distance:
         slot.anchor_x, slot.anchor_y, slot.anchor_tick = x, y, slot.tick
     if has_contact:

@@ -42,6 +42,7 @@ class Slot(Protocol):
     path_length: float
     tick: int
     negative_count: int
+    not_forward_count: int
     contact_count: int
     outcome: int
     random_state: np.uint64
@@ -152,6 +153,7 @@ class BatchState:
     times: FloatArray
     path_lengths: FloatArray
     negative_counts: IntArray
+    not_forward_counts: IntArray
     contact_counts: IntArray
     outcomes: IntArray
 
@@ -173,6 +175,7 @@ def snapshot(slots: NDArray[np.void], *, time_step: float) -> BatchState:
         times=slots["tick"] * time_step,
         path_lengths=slots["path_length"].copy(),
         negative_counts=slots["negative_count"].copy(),
+        not_forward_counts=slots["not_forward_count"].copy(),
         contact_counts=slots["contact_count"].copy(),
         outcomes=slots["outcome"].copy(),
     )

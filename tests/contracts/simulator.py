@@ -49,7 +49,8 @@ def _check_shapes(simulator: Simulator, beams: int) -> None:
     assert state.poses.shape == (2, 3)
     for pairs in (state.velocities, state.commands, state.goals, state.local_goals):
         assert pairs.shape == (2, 2)
-    for singles in (state.path_lengths, state.negative_counts, state.outcomes):
+    counts = (state.negative_counts, state.not_forward_counts)
+    for singles in (state.path_lengths, *counts, state.outcomes):
         assert singles.shape == (2,)
     np.testing.assert_allclose(state.times, [0.15, 0.15])
     np.testing.assert_array_equal(state.goals, [[3.0, 0.0], [2.5, 0.0]])

@@ -43,9 +43,14 @@ halvings = 4
 permutations = 19
 driven = 2
 
+[difficulty]
+trials = 1
+recorded = 3
+
 [training]
 steps = 400
 parallel_envs = 8
+difficulty = "weigh"
 
 [evaluation]
 trials = 2
@@ -139,11 +144,25 @@ def test_a_night_says_how_well_its_environments_stand_for_the_pool(
     assert page.count('<tr class="group">') == 5
 
 
+def test_a_night_drives_again_where_robots_struggled(fleet: Fleet, first: dict[str, Any]) -> None:
+    tables = read_tables(fleet.root)
+    rows = tables["difficulties"][tables["difficulties"].run_id == first["run_id"]]
+    assert set(rows.policy_id) == {first["champion"]}
+    assert set(rows.trials) == {1}
+    selected = tables["selections"][tables["selections"].run_id == first["run_id"]]
+    hardest = selected.sort_values("rank").environment_id.to_list()[:3]
+    synthesized = tables["environments"][tables["environments"].run_id == first["run_id"]]
+    assert sorted(rows.environment_id) == sorted({*hardest, *synthesized.environment_id})
+    page = Path(first["report"]).read_text(encoding="utf-8")
+    assert "Are they as hard as the log says?" in page
+    assert "difficulty/" in page
+
+
 def test_the_nights_rows_stand_in_every_table(fleet: Fleet, first: dict[str, Any]) -> None:
     tables = read_tables(fleet.root)
     assert len(tables["logs"]) == 8
     assert (tables["scenarios"].kind == "scenario").sum() == first["scenarios"]
-    for table in ("selections", "episodes", "policies"):
+    for table in ("selections", "difficulties", "episodes", "policies"):
         assert set(tables[table].run_id) == {first["run_id"]}
     (policy,) = tables["policies"].to_dict("records")
     assert policy["policy_id"] == first["policy"]

@@ -4,6 +4,7 @@ import numpy as np
 
 from ses_core.evaluation.comparison import Comparison
 from ses_core.evaluation.episodes import Episode
+from ses_core.evaluation.label_agreement import agreement_by_group, label_agreement
 from ses_core.evaluation.statistics import PolicySummary
 from ses_core.extraction.funnel import FunnelStep
 from ses_core.learning.training_curve import CurvePoint
@@ -12,6 +13,7 @@ from ses_core.scorecard.result import Measured, Scorecard
 from ses_core.scorecard.rows import Aim, ScorecardRow
 from storage.night_report import (
     Decision,
+    DifficultyUse,
     EvaluationUse,
     Funnel,
     NightReport,
@@ -69,6 +71,7 @@ def full_night() -> NightReport:
         ),
         synthesized=environments(100, origin="s"),
         scorecard=scorecard(),
+        difficulty=difficulty(),
         training=TrainingUse(
             policy="night-1f2e3d",
             parent="original",
@@ -233,6 +236,25 @@ def scorecard() -> Scorecard:
     )
 
 
+def difficulty() -> DifficultyUse:
+    """Twelve places of two sites, the second one's counts in the wrong order."""
+    logged = np.arange(60.0, 72.0)
+    simulated = np.concatenate((np.arange(46.0, 52.0), np.arange(54.0, 48.0, -1.0)))
+    sites = ["home-0"] * 6 + ["<b>home</b>"] * 6
+    return DifficultyUse(
+        driver="original",
+        trials=3,
+        count_name="steps with v < 0",
+        logged=logged,
+        simulated=simulated,
+        threshold=50.0,
+        whole=label_agreement(logged, simulated, threshold=50.0),
+        sites=agreement_by_group(logged, simulated, sites, threshold=50.0),
+        synthesized=100,
+        synthesized_hard=0.25,
+    )
+
+
 def score_row(
     metric: str,
     *,
@@ -311,6 +333,7 @@ def episode(policy: str, world: int) -> Episode:
         optimal_time_s=4.0,
         barn_score=0.2,
         negative_velocity_count=3,
+        not_forward_count=5,
         simulator="batch",
         start_x_m=1.0,
         start_y_m=1.5,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ses_core.evaluation.label_agreement import label_agreement
 from ses_core.robot_profile import JACKAL, TURTLEBOT4
 from storage.night_report import NightReport
 from storage.report_page import GALLERY_LIMIT, render_page, write_report
@@ -81,7 +82,7 @@ def test_only_the_page_s_own_script_may_run(full_page: Page) -> None:
 
 def test_every_picture_is_a_whole_png(full_page: Page) -> None:
     images = full_page.images()
-    assert len(images) == 7
+    assert len(images) == 8
     for content in images:
         with Image.open(io.BytesIO(content)) as image:
             image.load()
@@ -90,7 +91,7 @@ def test_every_picture_is_a_whole_png(full_page: Page) -> None:
 
 def test_every_figure_has_a_twin_for_dark_pages(full_page: Page) -> None:
     sources = [attributes for tag, attributes in full_page.tags if tag == "source"]
-    assert len(sources) == 7
+    assert len(sources) == 8
     assert {item["media"] for item in sources} == {"(prefers-color-scheme: dark)"}
 
 
@@ -213,3 +214,36 @@ def test_a_full_page_stays_small(tmp_path: Path) -> None:
     write_report(path, full_night())
     assert path.stat().st_size < 1_000_000
     assert path.read_text(encoding="utf-8") == render_page(full_night())
+
+
+def test_the_page_sets_verified_difficulty_beside_the_log(full_page: Page) -> None:
+    assert "Are they as hard as the log says?" in full_page.text
+    words = plain(full_page)
+    assert "home-0 6 1.00 16.7 % of 6" in words
+    assert "<b>home</b> 6 -1.00 66.7 % of 6" in words
+    assert "original , the policy that is gone on from, drove again" in words
+    assert "12 recorded places, 3 times each. Of those that the log calls" in words
+    assert "calls challenging, 41.7 % were hard again; of 100 synthesized" in words
+
+
+def test_a_night_that_verified_nothing_says_nothing_of_it() -> None:
+    html = render_page(replace(full_night(), difficulty=None))
+    assert "Are they as hard" not in html
+    assert html.count("data:image/png") == render_page(full_night()).count("data:image/png") - 2
+
+
+def test_a_night_without_recorded_places_shows_no_scatter() -> None:
+    night = full_night()
+    assert night.difficulty is not None
+    none = np.zeros(0)
+    bare = replace(
+        night.difficulty,
+        logged=none,
+        simulated=none,
+        whole=label_agreement(none, none, threshold=50.0),
+        sites={},
+    )
+    page = Page(render_page(replace(night, difficulty=bare)))
+    assert "of 100 synthesized environments, 25.0 % were as hard" in plain(page)
+    assert "Rank correlation" not in page.text
+    assert len(page.images()) == 7

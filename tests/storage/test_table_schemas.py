@@ -17,7 +17,9 @@ PROMISED = {
     "dispersion characteristic_dimension_m tortuosity",
     "selections": "run_id scenario_id rank count_kind",
     "episodes": "episode_id run_id policy world_id pair trial seed outcome time_s path_length_m "
-    "optimal_time_s barn_score negative_velocity_count",
+    "optimal_time_s barn_score negative_velocity_count not_forward_count",
+    "difficulties": "environment_id policy_id trials negative_velocity_count not_forward_count "
+    "success_rate restricted_mean_time_s run_id",
     "policies": "policy_id parent_id run_id algorithm steps seed environments created_stamp_ns "
     "decision",
 }

@@ -30,6 +30,7 @@ def episode(
         optimal_time_s=optimal,
         barn_score=barn_score(EpisodeOutcome[outcome.upper()], time=time, optimal_time=optimal),
         negative_velocity_count=3,
+        not_forward_count=5,
         simulator="batch",
         start_x_m=1.0,
         start_y_m=1.5,

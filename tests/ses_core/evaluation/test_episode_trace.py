@@ -61,6 +61,7 @@ def test_a_trace_is_the_episode_of_the_evaluation(
 
     assert trace.episode == evaluated[1]
     assert trace.is_reversing.sum() == trace.episode.negative_velocity_count
+    assert (trace.commands[1:, 0] <= 0.05).sum() == trace.episode.not_forward_count
     assert trace.times[-1] == trace.episode.time_s
     steps = np.diff(trace.poses[:, :2], axis=0)
     assert np.hypot(*steps.T).sum() == pytest.approx(trace.episode.path_length_m)

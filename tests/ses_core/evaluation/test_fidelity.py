@@ -29,6 +29,7 @@ def _episode(trial: int, outcome: str, time: float, count: int, policy: str = "a
         optimal_time_s=1.0,
         barn_score=0.0,
         negative_velocity_count=count,
+        not_forward_count=count,
         simulator="batch",
         start_x_m=0.0,
         start_y_m=0.0,

@@ -50,6 +50,7 @@ def made_up(speeds: FloatArray, *, outcome: str = "success") -> EpisodeTrace:
         episode=replace(
             episode("driver", "corridor", outcome, 0.05 * len(speeds)),
             negative_velocity_count=int((speeds < 0.0).sum()),
+            not_forward_count=int((speeds <= 0.05).sum()),
         ),
         times=0.05 * np.arange(len(commands), dtype=np.float64),
         poses=poses,

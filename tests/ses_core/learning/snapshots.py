@@ -20,6 +20,7 @@ class Snapshot:
     times: FloatArray = field(default_factory=lambda: np.zeros(1))
     path_lengths: FloatArray = field(default_factory=lambda: np.zeros(1))
     negative_counts: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    not_forward_counts: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
     outcomes: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
 
 

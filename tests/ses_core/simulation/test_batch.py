@@ -84,6 +84,7 @@ def test_a_dead_end_makes_the_robot_back_up_or_stick() -> None:
     drive_out(driven)
     state = driven.state()
     assert np.any(state.negative_counts > 20)
+    assert np.all(state.not_forward_counts >= state.negative_counts)
     # Straight through would be 6 m: whoever arrived went in, out and round.
     has_arrived = state.outcomes == EpisodeOutcome.SUCCESS
     assert np.all(state.path_lengths[has_arrived] > 7.0)
@@ -204,6 +205,7 @@ def test_planning_and_settling_tick_by_tick_is_advancing() -> None:
     after = split.state()
     np.testing.assert_array_equal(after.commands, whole.state().commands)
     np.testing.assert_array_equal(after.negative_counts, whole.state().negative_counts)
+    np.testing.assert_array_equal(after.not_forward_counts, whole.state().not_forward_counts)
     np.testing.assert_array_equal(after.times, whole.state().times)
     np.testing.assert_array_equal(split.scans(), whole.scans())
 
