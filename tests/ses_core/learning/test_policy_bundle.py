@@ -8,7 +8,6 @@ import pytest
 
 from ses_core.errors import ArtifactError
 from ses_core.learning.action import EIGHT, SEVEN, ActionSpec
-from ses_core.learning.action import SEVEN
 from ses_core.learning.observation import DEFAULT_OBSERVATION
 from ses_core.learning.policies import ParameterPolicy, random_policy
 from ses_core.learning.policy_bundle import (

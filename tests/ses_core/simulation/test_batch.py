@@ -250,7 +250,7 @@ def test_misuse_is_refused_in_words() -> None:
         driven.reset(np.array([0]), [course(hall())], np.array([0, 1]))
     with pytest.raises(ValueError, match="slot 4"):
         driven.reset(np.array([4]), [course(hall())], np.array([0]))
-    with pytest.raises(ValueError, match=r"\(1, 6\), expected \(1, 7\)"):
+    with pytest.raises(ValueError, match=r"\(1, 6\), expected \(1, 8\)"):
         driven.advance(np.zeros((1, 6)), 1)
     for slots, sense_every, beams in ((2, 4, 720), (1, 5, 720), (1, 4, 360)):
         trace = make_trace(slots, ticks=100, sense_every=sense_every, beams=beams)
