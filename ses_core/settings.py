@@ -183,6 +183,18 @@ class TrainingSettings(SettingsModel):
         description="Reward, constants of TD3 and SAC, and the observation and network of a "
         "policy without a parent: ours, those of the authors' code, or those of APPLR.",
     )
+    checkpoint_steps: int = Field(
+        25_000,
+        ge=1,
+        description="Decisions between two checkpoints, at which all robots start anew.",
+    )
+    replay_share: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="Share of a fine-tuning's episodes in the original policy's worlds, against "
+        "forgetting.",
+    )
     critic_share: float = Field(
         0.1, ge=0, lt=1, description="Share of a fine-tuning that trains the new critic alone."
     )

@@ -15,10 +15,10 @@ SYNTHESIZE = Stage("synthesize", 2)
 SCORECARD = Stage("scorecard", 1)
 DIFFICULTY = Stage("difficulty", 1)
 RENDER = Stage("render", 1)
-TRAIN = Stage("train", 2)
+TRAIN = Stage("train", 3)
 EVALUATE = Stage("evaluate", 4)
 REPORT = Stage("report", 3)
-PRETRAIN = Stage("pretrain", 2)
+PRETRAIN = Stage("pretrain", 3)
 DEPLOY = Stage("deploy", 2)
 
 STAGES = (

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,11 @@ from ses_core.evaluation.difficulty import draw_weights
 from ses_core.learning.policy_bundle import Lineage
 from ses_core.learning.reward import reward_of
 from ses_core.navigation import NavigationTask, environment_task
-from ses_core.recipes import ArtifactRef, JsonValue, Recipe, settings_json
+from ses_core.recipes import ArtifactRef, JsonValue, Recipe, digest_json, settings_json
 from ses_core.settings import Settings
+from ses_core.worlds.identity import content_digest
 from storage.artifact_store import LocalArtifactStore
+from storage.checkpoint_files import CheckpointFile
 from storage.difficulty_files import read_difficulties
 from storage.environment_files import read_environments
 from storage.materialize import Materialized, materialize
@@ -72,6 +74,8 @@ def train_policy(
     if use != "ignore" and difficulty is not None:
         inputs += (difficulty,)
 
+    recipe = Recipe(TRAIN, asked, inputs=inputs)
+
     def build(directory: Path) -> None:
         domain = read_environments(store.path(environments))
         tasks = [environment_task(environment) for environment in domain.environments]
@@ -85,10 +89,11 @@ def train_policy(
             trained_in=f"environments of 5 m synthesized by {', '.join(made_by)}",
             settings=settings,
             weights=draw_weights(domain.environments, found, use),
+            checkpoint=store.layout.staging / f"{recipe.key()}.checkpoint",
             deadline=stop_at(deadline_stamp_s),
         )
 
-    return conclude(materialize(store, Recipe(TRAIN, asked, inputs=inputs), build, anew=anew))
+    return conclude(materialize(store, recipe, build, anew=anew))
 
 
 @task(name="train the policy in a folder", cache_policy=NO_CACHE)
@@ -156,9 +161,12 @@ def save_training(
     trained_in: str,
     settings: Settings,
     weights: FloatArray | None = None,
+    checkpoint: Path | None = None,
     deadline: Callable[[], bool] = lambda: False,
 ) -> TrainingRecord:
     """Train and write bundle, learning curve and record into a folder.
+
+    A training that was killed goes on from its last checkpoint when it is asked for again.
 
     Args:
         directory: Where to; it is made if it is missing.
@@ -168,12 +176,27 @@ def save_training(
         trained_in: What the tasks are, in words, for the card.
         settings: Training, simulation and target robot.
         weights: How often each task is drawn; equally often without.
+        checkpoint: File that checkpoints are kept in; without one, a file in the folder.
         deadline: Asked after every decision whether to stop.
     """
     # torch and stable-baselines3 take seconds to import: only a training pays for them.
+    from ses_core.learning.pretraining import generated_worlds, training_tasks, with_replay
     from ses_core.learning.training import train
 
     bundle = parent.bundle if parent else None
+    own_count = len(tasks) if weights is None else int(np.count_nonzero(weights))
+    if bundle and settings.training.replay_share:
+        tasks, weights = with_replay(
+            tasks,
+            weights,
+            training_tasks(generated_worlds("train"), profile=settings.target_robot, seed=0),
+            share=settings.training.replay_share,
+        )
+    directory.mkdir(parents=True, exist_ok=True)
+    kept = CheckpointFile(
+        checkpoint or directory / "training.checkpoint",
+        asked=_training_digest(tasks, weights, bundle.policy_id if bundle else "", settings),
+    )
     result = train(
         tasks,
         parent=bundle.policy if bundle else None,
@@ -181,6 +204,8 @@ def save_training(
         simulation=settings.simulation,
         profile=settings.target_robot,
         weights=weights,
+        checkpoint=kept.found(),
+        keep=kept.keep,
         progress=report_progress("train"),
         deadline=deadline,
     )
@@ -188,7 +213,7 @@ def save_training(
         algorithm=settings.training.algorithm,
         steps=result.steps,
         seed=settings.training.seed,
-        environments=len(tasks) if weights is None else int(np.count_nonzero(weights)),
+        environments=own_count,
         seconds=round(result.seconds, 1),
         ended=result.reason,
         parent=parent.name if parent else "",
@@ -213,4 +238,28 @@ def save_training(
     )
     write_curve(directory, result.curve)
     write_record(directory / TRAINING_FILE, asdict(record))
+    kept.drop()
     return record
+
+
+def _training_digest(
+    tasks: Sequence[NavigationTask],
+    weights: FloatArray | None,
+    parent_id: str,
+    settings: Settings,
+) -> str:
+    """Digest everything that decides what a training gives."""
+    courses = [
+        [content_digest(task.world.grid), *astuple(task.start), *task.goal] for task in tasks
+    ]
+    return digest_json(
+        [
+            TRAIN.version,
+            courses,
+            None if weights is None else weights.tolist(),
+            parent_id,
+            settings_json(settings.training),
+            settings_json(settings.simulation),
+            settings_json(settings.target_robot),
+        ]
+    )

@@ -77,14 +77,15 @@ class _SquashedMeanPolicy(ActorCriticPolicy):
 class _FadingNoise(NormalActionNoise):
     """Exploration whose standard deviation falls from one value to another."""
 
-    def __init__(self, first: float, last: float, *, length: int, decisions: int) -> None:
+    def __init__(
+        self, first: float, last: float, *, length: int, progress: Callable[[], float]
+    ) -> None:
         super().__init__(mean=np.zeros(length), sigma=np.full(length, first))
-        self._first, self._last, self._decisions, self._made = first, last, decisions, 0
+        self._first, self._last, self._progress = first, last, progress
 
     def __call__(self) -> NDArray[Any]:
-        share = min(1.0, self._made / self._decisions)
+        share = min(1.0, self._progress())
         self._sigma[:] = self._first + share * (self._last - self._first)
-        self._made += 1
         return super().__call__()
 
 
@@ -201,10 +202,15 @@ def _make_td3(
         "MlpPolicy",
         env,
         **_off_policy(env, hidden, settings, rounds=rounds, rate=1e-4),
-        action_noise=_FadingNoise(*_NOISE, length=_action_length(env), decisions=rounds),
         policy_delay=2,
     )
-    return learner, rounds * env.num_envs
+    decisions = rounds * env.num_envs
+    learner.action_noise = _FadingNoise(
+        *_NOISE,
+        length=_action_length(env),
+        progress=lambda: learner.num_timesteps / decisions,
+    )
+    return learner, decisions
 
 
 def _action_length(env: VecEnv) -> int:

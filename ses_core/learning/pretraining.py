@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from ses_core.arrays import FloatArray
 from ses_core.navigation import NavigationTask, World
 from ses_core.robot_profile import RobotProfile
 from ses_core.settings import SimulationSettings, TrainingSettings
@@ -68,3 +69,26 @@ def training_tasks(
     return [
         task for world in worlds for task in sample_tasks(world, pairs, profile=profile, rng=rng)
     ]
+
+
+def with_replay(
+    tasks: Sequence[NavigationTask],
+    weights: FloatArray | None,
+    replayed: Sequence[NavigationTask],
+    *,
+    share: float,
+) -> tuple[list[NavigationTask], FloatArray]:
+    """Mix tasks of an earlier training into a new one's, against forgetting.
+
+    Args:
+        tasks: The new training's.
+        weights: How often each of these is drawn (N,), in any scale; equally often without.
+        replayed: The earlier training's, drawn equally often.
+        share: Of the draws that go to the earlier training's.
+
+    Returns:
+        All tasks, and how often each is drawn, with sum 1.
+    """
+    own = np.ones(len(tasks)) if weights is None else weights
+    old = np.full(len(replayed), share / len(replayed))
+    return [*tasks, *replayed], np.concatenate([(1.0 - share) * own / own.sum(), old])

@@ -1,7 +1,7 @@
 """Training the parameter policy, from its parent or from nothing (leaf: torch)."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,6 +51,8 @@ def train(
     simulation: SimulationSettings,
     profile: RobotProfile,
     weights: FloatArray | None = None,
+    checkpoint: Mapping[str, bytes] | None = None,
+    keep: Callable[[Mapping[str, bytes]], None] | None = None,
     progress: Callable[[float], None] = lambda _: None,
     deadline: Callable[[], bool] = lambda: False,
 ) -> TrainingResult:
@@ -61,7 +63,8 @@ def train(
     first `critic_share` of the decisions the new critic learns alone, so that what it does not
     know yet cannot spoil the actor.
 
-    Equal arguments give equal weights on one machine.
+    Equal arguments give equal weights on one machine, also for a training that was stopped and
+    goes on from its checkpoint.
 
     Args:
         tasks: What episodes are drawn from.
@@ -70,10 +73,13 @@ def train(
         simulation: Rates and imperfections of the robot.
         profile: The robot.
         weights: How often each task is drawn; equally often without.
+        checkpoint: Files of a checkpoint of this very training, to go on from.
+        keep: Takes the files of every checkpoint; the last is enough.
         progress: Hears the share that is done, from 0 to 1.
         deadline: Asked after every decision; the training ends when it says yes.
 
     Raises:
+        ArtifactError: The checkpoint is damaged, or of another learner.
         ValueError: There is no task, or the parent sets other parameters than the settings ask for.
     """
     started = time.perf_counter()
@@ -116,10 +122,15 @@ def train(
             start=start,
             decisions=decisions,
             frozen_decisions=round(settings.critic_share * decisions) if parent else 0,
+            checkpoint_decisions=settings.checkpoint_steps,
+            keep=keep,
             progress=progress,
             deadline=deadline,
         )
-        learner.learn(decisions, callback=monitor)
+        if checkpoint is not None:
+            monitor.resume(checkpoint, learner)
+        made = learner.num_timesteps
+        learner.learn(decisions - made, callback=monitor, reset_num_timesteps=made == 0)
         final = extract_policy(learner, start)
     finally:
         torch.set_num_threads(threads)

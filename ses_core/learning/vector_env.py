@@ -78,6 +78,15 @@ class VectorNavigationEnv(VecEnv):
             observations = self._process.observe()
         return observations, (REWARD_SCALE * decision.rewards).astype(np.float32), done, infos
 
+    @property
+    def random_state(self) -> dict[str, Any]:
+        """State of the generator that draws tasks and starts, as JSON values."""
+        return dict(self._rng.bit_generator.state)
+
+    @random_state.setter
+    def random_state(self, state: dict[str, Any]) -> None:
+        self._rng.bit_generator.state = state
+
     def close(self) -> None:
         """Do nothing: whoever made the simulator closes it."""
 

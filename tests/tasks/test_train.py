@@ -1,5 +1,7 @@
 """Tests of training stages: the bundle is what the settings asked for."""
 
+import itertools
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -8,8 +10,10 @@ from ses_core.learning import pretraining
 from ses_core.robot_profile import TURTLEBOT4
 from ses_core.settings import Settings, TrainingSettings
 from ses_core.worlds.cellular_automata import generate_barn_world
+from storage.checkpoint_files import CheckpointFile
 from storage.policy_files import read_policy
-from tasks.train import pretrain_policy
+from tasks.train import pretrain_policy, save_training
+from tests.ses_core.learning.places import corridor
 
 
 def test_a_policy_from_nothing_is_the_one_that_the_settings_ask_for(
@@ -33,3 +37,49 @@ def test_a_policy_from_nothing_is_the_one_that_the_settings_ask_for(
     assert bundle.policy.decision_period == 0.5
     assert bundle.reward is not None
     assert bundle.reward.name == "paper"
+
+
+def test_a_killed_training_goes_on_and_ends_with_the_same_policy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Settings(
+        training=TrainingSettings(steps=2048, parallel_envs=16, checkpoint_steps=1000)
+    )
+    tasks = [corridor()]
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    save = partial(
+        save_training,
+        tasks=tasks,
+        parent=None,
+        run_id="",
+        trained_in="a corridor",
+        settings=settings,
+    )
+    save(whole)
+    assert not (whole / "training.checkpoint").exists()
+
+    def die() -> bool:
+        if (killed / "training.checkpoint").is_file():
+            raise KeyboardInterrupt
+        return False
+
+    with pytest.raises(KeyboardInterrupt):
+        save(killed, deadline=die)
+    decisions = itertools.count(1)
+    save(killed, deadline=lambda: next(decisions) < 0)
+    assert next(decisions) == 65  # of each of 16 robots: the second rollout alone
+    assert read_policy(killed).policy_id == read_policy(whole).policy_id
+    assert not (killed / "training.checkpoint").exists()
+
+
+@pytest.mark.parametrize("content", [None, b"", b"PK no archive"])
+def test_what_is_no_checkpoint_of_this_training_is_not_gone_on_from(
+    tmp_path: Path, content: bytes | None
+) -> None:
+    path = tmp_path / "training.checkpoint"
+    if content is None:
+        CheckpointFile(path, asked="another").keep({"state.json": b"{}"})
+        assert CheckpointFile(path, asked="another").found() == {"state.json": b"{}"}
+    else:
+        path.write_bytes(content)
+    assert CheckpointFile(path, asked="this").found() is None

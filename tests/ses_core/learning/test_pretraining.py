@@ -1,9 +1,14 @@
 """Tests of how the original policy comes about."""
 
+import numpy as np
+import pytest
+
+from ses_core.arrays import FloatArray
 from ses_core.learning.pretraining import (
     WORLD_SEED,
     pretraining,
     training_tasks,
+    with_replay,
     world_numbers,
 )
 from ses_core.robot_profile import JACKAL
@@ -39,3 +44,13 @@ def test_a_world_with_a_course_gives_that_course_and_another_gives_pairs() -> No
     tasks = training_tasks([with_course, without], profile=JACKAL, seed=0, pairs=3)
     assert (tasks[0].start, tasks[0].goal) == with_course.course
     assert [task.world.world_id for task in tasks[1:]] == ["room"] * 3
+
+
+@pytest.mark.parametrize("weights", [None, np.array([3.0, 1.0])])
+def test_replayed_tasks_get_their_share_of_the_draws(weights: FloatArray | None) -> None:
+    old, new = [corridor()] * 5, [corridor(), corridor()]
+    tasks, shares = with_replay(new, weights, old, share=0.2)
+    assert tasks == [*new, *old]
+    assert shares.sum() == pytest.approx(1.0)
+    assert shares[2:] == pytest.approx(0.04)
+    assert shares[:2] == pytest.approx([0.4, 0.4] if weights is None else [0.6, 0.2])

@@ -1,12 +1,15 @@
 """Tests of training in the real simulator."""
 
 import itertools
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import pytest
+import torch
 
+from ses_core.errors import ArtifactError
 from ses_core.learning.action import SEVEN
 from ses_core.learning.observation import (
     AUTHORS_OBSERVATION,
@@ -121,4 +124,57 @@ def test_no_task_is_refused() -> None:
             settings=SHORT,
             simulation=SimulationSettings(),
             profile=JACKAL,
+        )
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "has_parent"), [("ppo", True), ("ppo", False), ("td3", True), ("sac", True)]
+)
+def test_a_training_that_goes_on_from_a_checkpoint_ends_as_if_never_stopped(
+    algorithm: Literal["ppo", "td3", "sac"], has_parent: bool
+) -> None:
+    settings = TrainingSettings(
+        # A rollout of PPO is 1,024 decisions, one of the others 32.
+        steps=2048 if algorithm == "ppo" else 1024,
+        parallel_envs=32,
+        algorithm=algorithm,
+        checkpoint_steps=350,
+        critic_share=0.5,
+    )
+
+    def train_from(
+        checkpoint: Mapping[str, bytes] | None, keep: Callable[[Mapping[str, bytes]], None]
+    ) -> TrainingResult:
+        return train(
+            [corridor()],
+            parent=parent() if has_parent else None,
+            settings=settings,
+            simulation=SimulationSettings(sensing_rate_hz=2.0),
+            profile=JACKAL,
+            checkpoint=checkpoint,
+            keep=keep,
+        )
+
+    kept: list[Mapping[str, bytes]] = []
+    whole = train_from(None, kept.append)
+    assert len(kept) == (1 if algorithm == "ppo" else 2)
+    np.random.seed(5)  # noqa: NPY002  (a new process would stand elsewhere)
+    torch.manual_seed(5)
+    resumed = train_from(kept[-1], lambda _: None)
+    for a, b in zip(whole.policy.weights, resumed.policy.weights, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert resumed.curve == whole.curve
+    assert resumed.steps == whole.steps
+
+
+@pytest.mark.parametrize("damage", [b"", b"{}", b"x" * 40])
+def test_a_damaged_checkpoint_is_refused(damage: bytes) -> None:
+    with pytest.raises(ArtifactError, match="checkpoint cannot be read"):
+        train(
+            [corridor()],
+            parent=None,
+            settings=SHORT,
+            simulation=SimulationSettings(),
+            profile=JACKAL,
+            checkpoint={"learner.safetensors": damage, "state.json": damage},
         )

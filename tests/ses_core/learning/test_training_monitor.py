@@ -57,6 +57,7 @@ def watch(turn: int, *, stop_after: int | None = None) -> tuple[TrainingMonitor,
     monitor = TrainingMonitor(
         start=start,
         decisions=decisions,
+        checkpoint_decisions=10_000,
         frozen_decisions=0,
         progress=shares.append,
         deadline=deadline,
