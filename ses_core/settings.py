@@ -195,8 +195,11 @@ class TrainingSettings(SettingsModel):
         description="Share of a fine-tuning's episodes in the original policy's worlds, against "
         "forgetting.",
     )
+    keep_critic: bool = Field(
+        False, description="Go on with the parent's critic too, where one is kept beside it."
+    )
     critic_share: float = Field(
-        0.1, ge=0, lt=1, description="Share of a fine-tuning that trains the new critic alone."
+        0.1, ge=0, lt=1, description="Share of a fine-tuning that trains a new critic alone."
     )
     start_yaw_jitter_rad: float = Field(
         0.3, ge=0, description="A start is turned by up to this, either way."

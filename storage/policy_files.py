@@ -1,10 +1,15 @@
 """Policies on disk: bundles, learning curves, and the policies that have names."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_tensors
+from safetensors.numpy import save as save_tensors
+
+from ses_core.arrays import Float32Array
 from ses_core.errors import ArtifactError
 from ses_core.learning.policies import FIXED_POLICIES, ParameterPolicy
 from ses_core.learning.policy_bundle import (
@@ -28,6 +33,7 @@ ORIGINAL_FOLDER = Path(__file__).parent / "shipped" / "original"
 """The shipped original policy: what `ses pretrain` makes with its defaults."""
 
 CURVE_FILE = "curve.json"
+CRITIC_FILE = "critic.safetensors"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,13 +42,15 @@ class NamedPolicy:
 
     Attributes:
         policy_id: Digest of a learned policy; the name of a fixed one.
-        bundle: Where it was read from; None for fixed parameters.
+        bundle: What was read; None for fixed parameters.
+        folder: Where from; None for fixed parameters.
     """
 
     name: str
     policy_id: str
     policy: Policy
     bundle: PolicyBundle | None
+    folder: Path | None = None
 
 
 def write_policy(
@@ -94,6 +102,26 @@ def read_curve(directory: Path) -> list[CurvePoint]:
         raise ArtifactError(f"learning curve {file} cannot be read: {error}") from error
 
 
+def write_critic(directory: Path, critic: Mapping[str, Float32Array]) -> None:
+    """Write a critic's tensors beside its bundle; a robot needs none."""
+    (directory / CRITIC_FILE).write_bytes(save_tensors(dict(critic)))
+
+
+def read_critic(directory: Path) -> dict[str, Float32Array] | None:
+    """Read the critic beside a bundle; None where none was kept.
+
+    Raises:
+        ArtifactError: It is damaged.
+    """
+    file = directory / CRITIC_FILE
+    if not file.is_file():
+        return None
+    try:
+        return load_tensors(file.read_bytes())
+    except SafetensorError as error:
+        raise ArtifactError(f"critic {file} cannot be read: {error}") from error
+
+
 def find_policy(name: str, layout: Layout | None) -> NamedPolicy:
     """Find a policy by the name people give it.
 
@@ -109,7 +137,9 @@ def find_policy(name: str, layout: Layout | None) -> NamedPolicy:
         return NamedPolicy(name=name, policy_id=name, policy=FIXED_POLICIES[name], bundle=None)
     folder = _bundle_folder(name, layout)
     bundle = read_policy(folder)
-    return NamedPolicy(name=name, policy_id=bundle.policy_id, policy=bundle.policy, bundle=bundle)
+    return NamedPolicy(
+        name=name, policy_id=bundle.policy_id, policy=bundle.policy, bundle=bundle, folder=folder
+    )
 
 
 def _bundle_folder(name: str, layout: Layout | None) -> Path:

@@ -9,7 +9,7 @@ import numpy as np
 from prefect import task
 from prefect.cache_policies import NO_CACHE
 
-from ses_core.arrays import FloatArray
+from ses_core.arrays import Float32Array, FloatArray
 from ses_core.evaluation.difficulty import draw_weights
 from ses_core.learning.policy_bundle import Lineage
 from ses_core.learning.reward import reward_of
@@ -22,7 +22,14 @@ from storage.checkpoint_files import CheckpointFile
 from storage.difficulty_files import read_difficulties
 from storage.environment_files import read_environments
 from storage.materialize import Materialized, materialize
-from storage.policy_files import NamedPolicy, find_policy, write_curve, write_policy
+from storage.policy_files import (
+    NamedPolicy,
+    find_policy,
+    read_critic,
+    write_critic,
+    write_curve,
+    write_policy,
+)
 from storage.stage_records import write_record
 from storage.stages import TRAIN
 from storage.training_record import TRAINING_FILE, TrainingRecord
@@ -200,6 +207,7 @@ def save_training(
     result = train(
         tasks,
         parent=bundle.policy if bundle else None,
+        critic=_kept_critic(parent, settings),
         settings=settings.training,
         simulation=settings.simulation,
         profile=settings.target_robot,
@@ -236,10 +244,18 @@ def save_training(
         simulation=settings.simulation,
         reward=reward_of(settings.training),
     )
+    write_critic(directory, result.critic)
     write_curve(directory, result.curve)
     write_record(directory / TRAINING_FILE, asdict(record))
     kept.drop()
     return record
+
+
+def _kept_critic(parent: NamedPolicy | None, settings: Settings) -> dict[str, Float32Array] | None:
+    """Give the parent's critic where the settings ask for it; None where none was kept."""
+    if parent is None or parent.folder is None or not settings.training.keep_critic:
+        return None
+    return read_critic(parent.folder)
 
 
 def _training_digest(

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from ses_core.arrays import FloatArray
+from ses_core.arrays import Float32Array, FloatArray
 from ses_core.learning.action import ACTIONS, DEFAULT_ACTION
 from ses_core.learning.algorithms import extract_policy, make_learner
+from ses_core.learning.critics import extract_critic, set_critic
 from ses_core.learning.decision_process import DecisionProcess
 from ses_core.learning.observation import observation_for
 from ses_core.learning.policies import HIDDEN_SIZES, ParameterPolicy, random_policy
@@ -30,6 +31,7 @@ class TrainingResult:
     """What a training gave.
 
     Attributes:
+        critic: Tensors of its critic, by name.
         curve: Learning curve, oldest stretch first.
         steps: Decisions made.
         seconds: Wall time [s].
@@ -37,6 +39,7 @@ class TrainingResult:
     """
 
     policy: ParameterPolicy
+    critic: Mapping[str, Float32Array]
     curve: tuple[CurvePoint, ...]
     steps: int
     seconds: float
@@ -47,6 +50,7 @@ def train(
     tasks: Sequence[NavigationTask],
     *,
     parent: ParameterPolicy | None,
+    critic: Mapping[str, Float32Array] | None = None,
     settings: TrainingSettings,
     simulation: SimulationSettings,
     profile: RobotProfile,
@@ -59,9 +63,9 @@ def train(
     """Train a policy in tasks (section IV-A, APPLR).
 
     A parent's actor is gone on with, under its own observation and sizes, and every so often as
-    it was trained to decide unless the settings say otherwise. Its critic is not kept: for the
-    first `critic_share` of the decisions the new critic learns alone, so that what it does not
-    know yet cannot spoil the actor.
+    it was trained to decide unless the settings say otherwise. Without its critic the first
+    `critic_share` of the decisions trains a new one alone, so that what it does not know yet
+    cannot spoil the actor.
 
     Equal arguments give equal weights on one machine, also for a training that was stopped and
     goes on from its checkpoint.
@@ -69,6 +73,7 @@ def train(
     Args:
         tasks: What episodes are drawn from.
         parent: The policy to go on from; None trains from random weights.
+        critic: The parent's critic, to go on with.
         settings: Algorithm, decisions, seed.
         simulation: Rates and imperfections of the robot.
         profile: The robot.
@@ -80,7 +85,8 @@ def train(
 
     Raises:
         ArtifactError: The checkpoint is damaged, or of another learner.
-        ValueError: There is no task, or the parent sets other parameters than the settings ask for.
+        ValueError: There is no task, the critic is of another algorithm or size, or the parent
+            sets other parameters than the settings ask for.
     """
     started = time.perf_counter()
     streams = np.random.SeedSequence(settings.seed).spawn(2)
@@ -118,10 +124,13 @@ def train(
         learner, decisions = make_learner(
             env, start, settings=settings, is_fine_tuning=parent is not None
         )
+        if critic is not None:
+            set_critic(learner, critic)
+        is_critic_new = parent is not None and critic is None
         monitor = TrainingMonitor(
             start=start,
             decisions=decisions,
-            frozen_decisions=round(settings.critic_share * decisions) if parent else 0,
+            frozen_decisions=round(settings.critic_share * decisions) if is_critic_new else 0,
             checkpoint_decisions=settings.checkpoint_steps,
             keep=keep,
             progress=progress,
@@ -131,13 +140,14 @@ def train(
             monitor.resume(checkpoint, learner)
         made = learner.num_timesteps
         learner.learn(decisions - made, callback=monitor, reset_num_timesteps=made == 0)
-        final = extract_policy(learner, start)
+        final, final_critic = extract_policy(learner, start), extract_critic(learner)
     finally:
         torch.set_num_threads(threads)
         simulator.close()
     progress(1.0)
     return TrainingResult(
         policy=(monitor.best or start) if monitor.reason == "diverged" else final,
+        critic=final_critic,
         curve=tuple(monitor.curve),
         steps=learner.num_timesteps,
         seconds=time.perf_counter() - started,

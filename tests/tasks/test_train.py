@@ -4,6 +4,7 @@ import itertools
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ses_core.learning import pretraining
@@ -11,7 +12,7 @@ from ses_core.robot_profile import TURTLEBOT4
 from ses_core.settings import Settings, TrainingSettings
 from ses_core.worlds.cellular_automata import generate_barn_world
 from storage.checkpoint_files import CheckpointFile
-from storage.policy_files import read_policy
+from storage.policy_files import find_policy, read_critic, read_policy
 from tasks.train import pretrain_policy, save_training
 from tests.ses_core.learning.places import corridor
 
@@ -83,3 +84,18 @@ def test_what_is_no_checkpoint_of_this_training_is_not_gone_on_from(
     else:
         path.write_bytes(content)
     assert CheckpointFile(path, asked="this").found() is None
+
+
+def test_a_parents_critic_is_kept_beside_it_and_gone_on_with_where_asked(tmp_path: Path) -> None:
+    training = TrainingSettings(steps=64, parallel_envs=4)
+    first, second = tmp_path / "first", tmp_path / "second"
+    save = partial(save_training, tasks=[corridor()], run_id="", trained_in="a corridor")
+    save(first, parent=None, settings=Settings(training=training))
+    parent = find_policy(str(first), None)
+    keeping = training.model_copy(update={"keep_critic": True, "learning_rate": 1e-9})
+    save(second, parent=parent, settings=Settings(training=keeping))
+    before, after = read_critic(first), read_critic(second)
+    assert before is not None
+    assert after is not None
+    for name, tensor in before.items():
+        np.testing.assert_allclose(after[name], tensor, atol=1e-6)

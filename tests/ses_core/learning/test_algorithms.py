@@ -6,7 +6,8 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from stable_baselines3 import TD3
+from stable_baselines3 import SAC, TD3
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from ses_core.arrays import Float32Array
@@ -16,6 +17,7 @@ from ses_core.learning.algorithms import (
     extract_policy,
     make_learner,
 )
+from ses_core.learning.critics import extract_critic, set_critic
 from ses_core.learning.navigation_env import action_space, observation_space
 from ses_core.learning.observation import DEFAULT_OBSERVATION
 from ses_core.learning.policies import ParameterPolicy, random_policy
@@ -153,3 +155,28 @@ def test_a_learner_learns_what_is_rewarded(algorithm: Algorithm) -> None:
     assert abs(start.actions(seen)[0, 0]) < 0.2
     learned = extract_policy(learner, start).actions(seen)[0, 0]
     assert learned > 0.4
+
+
+def learner_of(algorithm: Algorithm, *, seed: int) -> BaseAlgorithm:
+    settings = TrainingSettings(algorithm=algorithm, steps=64, seed=seed)
+    return make_learner(still_env(), some_policy(), settings=settings, is_fine_tuning=True)[0]
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_a_critic_goes_from_learner_to_learner(algorithm: Algorithm) -> None:
+    first, second = learner_of(algorithm, seed=0), learner_of(algorithm, seed=1)
+    critic = extract_critic(first)
+    assert any((critic[name] != other).any() for name, other in extract_critic(second).items())
+    set_critic(second, critic)
+    for name, tensor in extract_critic(second).items():
+        np.testing.assert_array_equal(tensor, critic[name])
+    if isinstance(second, TD3 | SAC):
+        for own, target in zip(
+            second.critic.parameters(), second.critic_target.parameters(), strict=True
+        ):
+            assert torch.equal(own, target)
+
+
+def test_another_learners_critic_is_refused() -> None:
+    with pytest.raises(ValueError, match="another algorithm's"):
+        set_critic(learner_of("ppo", seed=0), extract_critic(learner_of("td3", seed=0)))
